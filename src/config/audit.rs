@@ -1,4 +1,4 @@
-//! [`Criteria`]: what an audit does and how it judges.
+//! [`Criteria`]: the changes of an audit and the criteria of its verdicts.
 
 use crate::base::error::Error;
 use crate::config::reading;
@@ -7,28 +7,26 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// What an audit does and how it judges; keys of `--criteria FILE` and `--set`.
+/// The changes and criteria of an audit; keys of `--criteria FILE` and `--set`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Criteria {
-    /// A walk this far or shorter is no answer \[voxel lengths\]. Default 3, as in `eval`.
+    /// The walk up to which a robot gives no answer \[voxel lengths\]. Default 3, as in `eval`.
     pub threshold: f64,
-    /// The same in a changed simulation \[voxel lengths\]. Lower than `threshold`, so that
+    /// The limit in a changed simulation \[voxel lengths\]. Lower than `threshold`, so that
     /// borderline walkers do not fail on a tiny change. Default 1.5.
     pub least_walk: f64,
-    /// A walker answers at least this share of its training images, correctly or not. Default 0.75.
+    /// The least share of training images that a walker answers, correctly or not. Default 0.75.
     pub least_answered: f64,
-    /// A rollout persists if at least this share of the images answered correctly still is. Default
-    /// 0.9.
+    /// The least share of correct answers that a persistent rollout keeps. Default 0.9.
     pub least_kept: f64,
-    /// And if the walks under them, together, are at least this share of what they were. Default
-    /// 0.5.
+    /// The least share of the total walk under these images that it keeps. Default 0.5.
     pub least_distance: f64,
-    /// A robot that keeps at least this share of the rollouts in a changed world (stiffness,
-    /// friction, gravity, pixels) is robust; if another change breaks it, it exploits what was
-    /// changed; otherwise it is fragile. Default 0.75.
+    /// The least share of rollouts in a changed world (stiffness, friction, gravity, pixels) that a
+    /// robust robot keeps. If another change breaks a robust robot, it exploits what was changed;
+    /// other robots are fragile. Default 0.75.
     pub least_robust: f64,
-    /// Which changes, and how large.
+    /// The kinds and sizes of changes.
     pub perturbations: Sizes,
 }
 
@@ -47,16 +45,15 @@ impl Default for Criteria {
 }
 
 impl Criteria {
-    /// Reads criteria from TOML (or JSON, if the name ends so); keys that are not there have their
-    /// defaults.
+    /// Reads criteria from TOML (or JSON, if the name ends so); missing keys have their defaults.
     ///
     /// # Errors
-    /// What is wrong, with file, line and key.
+    /// Returns an error, with file, line and key, if the criteria are invalid.
     pub fn load(path: Option<&Path>, overrides: &[String]) -> Result<Self, Error> {
         reading::load(path, overrides, Criteria::check)
     }
 
-    /// Checks what a type cannot.
+    /// Checks what types cannot.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let Sizes { start, time_step, share, pixels, least_sensors: _, seed } = &self.perturbations;
         let shares = [self.least_answered, self.least_kept, self.least_distance, self.least_robust];

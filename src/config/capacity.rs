@@ -1,4 +1,4 @@
-//! What networks robots are compared with, and how those are trained.
+//! The networks to compare with robots, and their training.
 
 use crate::base::error::Error;
 use crate::baseline::{Hyperparameters, Kind, Pooling};
@@ -7,35 +7,35 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Largest size of a network that can be asked for.
+/// The largest size of a network.
 const MOST: usize = 1000;
 
-/// Most trainings of a size that can be asked for.
+/// The maximum number of trainings per size.
 const MOST_TRAININGS: usize = 100_000;
 
-/// What is trained, and how.
+/// The networks of a capacity analysis and their training.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CapacityConfig {
-    /// Kinds of network.
+    /// The kinds of network.
     pub networks: Vec<Kind>,
-    /// Smallest and largest size.
+    /// The smallest and the largest size.
     #[serde(deserialize_with = "pair::read")]
     pub sizes: [usize; 2],
-    /// From one size to the next.
+    /// The step from one size to the next.
     pub step: usize,
-    /// Trainings from scratch per size.
+    /// The number of trainings from scratch per size.
     pub trainings: usize,
-    /// Whether training waits for an improvement on images of the training split, not, as in the
-    /// paper, on the test images.
+    /// True if training waits for an improvement on images of the training split, not on the test
+    /// images as in the paper.
     pub clean: bool,
-    /// So many such images, evenly divided between the classes.
+    /// The number of such images, evenly divided between the classes.
     pub waiting_images: usize,
-    /// Seed of the trainings.
+    /// The seed of the trainings.
     pub seed: u64,
-    /// How networks with a hidden layer are trained.
+    /// The training of networks with a hidden layer.
     pub mlp: Hyperparameters,
-    /// How convolutional networks are trained.
+    /// The training of convolutional networks.
     pub cnn: Hyperparameters,
 }
 
@@ -56,15 +56,15 @@ impl Default for CapacityConfig {
 }
 
 impl CapacityConfig {
-    /// Reads settings from a file, and sets `overrides`.
+    /// Reads settings from a file, and applies `overrides`.
     ///
     /// # Errors
-    /// What is wrong with them.
+    /// Returns an error if they are invalid.
     pub fn load(path: Option<&Path>, overrides: &[String]) -> Result<Self, Error> {
         reading::load(path, overrides, CapacityConfig::check)
     }
 
-    /// Checks what a type cannot.
+    /// Checks what types cannot.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let refuse = |key: &str, text: &str| Err(Error::input(format!("capacity: {text}")).with_key(key));
         let [from, to] = self.sizes;
@@ -102,7 +102,7 @@ impl CapacityConfig {
         Ok(())
     }
 
-    /// How a kind of network is trained.
+    /// Returns the hyperparameters of a kind of network.
     pub fn of(&self, kind: Kind) -> &Hyperparameters {
         match kind {
             Kind::Mlp => &self.mlp,
@@ -110,7 +110,7 @@ impl CapacityConfig {
         }
     }
 
-    /// The sizes.
+    /// Returns the sizes to train.
     pub fn sizes(&self) -> impl Iterator<Item = usize> {
         (self.sizes[0]..=self.sizes[1]).step_by(self.step)
     }

@@ -1,5 +1,4 @@
-//! [`EvaluationConfig`]: a config's section `[evaluation]`, and what goes with `fitness =
-//! "response"`.
+//! [`EvaluationConfig`]: a config's section `[evaluation]`, and the rules of response fitness.
 
 use crate::base::error::Error;
 use crate::body::{Body, key};
@@ -13,7 +12,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct EvaluationConfig {
-    /// How answers to several images are judged together. Default the smallest margin, the paper's.
+    /// The fitness of answers to several images. Default the smallest margin, the paper's.
     pub fitness: Fitness,
 }
 
@@ -24,13 +23,13 @@ impl EvaluationConfig {
 }
 
 impl Config {
-    /// Whether fitness is a response: of the bodies' probes, with random images.
+    /// Returns true if fitness is the response of the bodies' probes to random images.
     pub fn measures_response(&self) -> bool {
         self.evaluation.fitness == Fitness::Response
     }
 
-    /// What stands for a body among those that were evaluated: itself, or what a response is
-    /// measured with, so that a gait is evaluated once, whatever its sensors are.
+    /// Returns the key of an evaluated body: its own, or that of its probe if fitness is a
+    /// response. Then a gait is evaluated once, whatever its sensors.
     pub(crate) fn known_key(&self, body: &Body) -> [u8; 16] {
         match self.measures_response() {
             true => key(&body.probe()),
@@ -38,11 +37,11 @@ impl Config {
         }
     }
 
-    /// By what the fitness of a body is multiplied: 1, or, if it is a response, the square root of
-    /// the number of its soft voxels and sensors, up to two thirds of its grid. Of two gaits that
-    /// respond as strongly, the one with more places can be taught more: together they can move it
-    /// by at most so much (Cauchy's inequality), and by that only if all respond alike. More than
-    /// two thirds are not rewarded: something has to walk.
+    /// Returns the factor of a body's fitness: 1, or for a response the square root of the number
+    /// of its soft voxels and sensors, up to two thirds of its grid. Of two gaits with equally
+    /// strong responses, the one with more places can be trained further: together they can move it
+    /// by at most this factor (Cauchy's inequality), and only if all respond alike. The limit is
+    /// there because something has to walk.
     pub(crate) fn place_factor(&self, body: &Body) -> f64 {
         match self.measures_response() {
             true => {
@@ -53,7 +52,7 @@ impl Config {
         }
     }
 
-    /// Checks what goes with `fitness = "response"`, if it is asked for.
+    /// Checks the rules of `fitness = "response"`, if it is set.
     pub(crate) fn validate_response(&self) -> Result<(), Error> {
         if self.evaluation.fitness != Fitness::Response {
             return Ok(());

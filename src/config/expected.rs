@@ -1,5 +1,5 @@
-//! What a value of settings may be, in words: from the JSON Schema of their type, which no change of the
-//! wording of a reader's errors can break.
+//! Describes the values that settings accept, from the JSON Schema of their type. Unlike a reader's
+//! errors, a schema does not change its wording.
 
 use crate::base::number;
 use crate::base::text::one_line;
@@ -8,19 +8,19 @@ use schemars::generate::SchemaSettings;
 use serde_json::Value;
 use serde_path_to_error::{Path, Segment};
 
-/// A value of another kind than settings have at its key.
+/// A value of the wrong kind for its key.
 #[derive(Debug, PartialEq)]
 pub(super) struct Mismatch {
-    /// The value, on one line; none of a list and of a table.
+    /// The value, on one line; `None` for a list or a table.
     scalar: Option<String>,
-    /// What it is: "a list", or as `scalar`.
+    /// The kind of the value: "a list", or the same as `scalar`.
     found: String,
-    /// What was expected, and where a text is nearly a number, what to write.
+    /// The expected kind, with the number to write if a text is nearly one.
     pub expected: String,
 }
 
 impl Mismatch {
-    /// The message with its key.
+    /// Formats the message with its key.
     pub fn at(&self, key: &str) -> String {
         let Mismatch { scalar, found, expected } = self;
         match scalar {
@@ -31,7 +31,7 @@ impl Mismatch {
     }
 }
 
-/// Looks at the value at a path of settings; none if its kind is right, or not known.
+/// Checks the value at a path of settings; returns `None` if its kind is right, or unknown.
 pub(super) fn mismatch<T: JsonSchema>(settings: &Value, path: &Path) -> Option<Mismatch> {
     let schema = Schema::of::<T>();
     let (mut value, mut schemas) = (settings, schema.alternatives(&schema.root));
@@ -58,15 +58,14 @@ pub(super) fn mismatch<T: JsonSchema>(settings: &Value, path: &Path) -> Option<M
     let (scalar, found) = match value {
         Value::Array(_) => (None, "a list".to_string()),
         Value::Object(_) => (None, "a table".to_string()),
-        // What JSON has no number for, such as TOML's inf.
+        // Numbers that JSON lacks, such as TOML's inf.
         Value::Null => return None,
         scalar => (Some(one_line(&scalar.to_string())), one_line(&scalar.to_string())),
     };
     Some(Mismatch { scalar, found, expected: format!("{}{meant}", expected.join(", or ")) })
 }
 
-/// The part of a key that settings do not have, with the keys of its table; none if they have it, or it is
-/// not known.
+/// Returns the unknown part of a key, if any, with the keys of its table.
 pub(super) fn unknown_part<T: JsonSchema>(key: &str) -> Option<(String, Vec<String>)> {
     let schema = Schema::of::<T>();
     let mut schemas = schema.alternatives(&schema.root);
@@ -87,7 +86,6 @@ pub(super) fn unknown_part<T: JsonSchema>(key: &str) -> Option<(String, Vec<Stri
     None
 }
 
-/// A type's schema.
 struct Schema {
     root: Value,
 }
@@ -98,7 +96,7 @@ impl Schema {
         Schema { root: generator.into_root_schema_for::<T>().to_value() }
     }
 
-    /// What a value of a schema may be one of.
+    /// Returns the alternatives of a value's schema.
     fn alternatives<'a>(&'a self, schema: &'a Value) -> Vec<&'a Value> {
         if let Some(name) = schema.get("$ref").and_then(Value::as_str) {
             let of_name = name.strip_prefix('#').and_then(|pointer| self.root.pointer(pointer));
@@ -128,12 +126,11 @@ impl Schema {
     }
 }
 
-/// The kind of a value.
 #[derive(Clone, Debug, PartialEq)]
 enum Kind {
     Null,
     Boolean,
-    /// With the least and the largest number.
+    /// With the smallest and the largest number.
     Integer(Option<i128>, Option<i128>),
     Number,
     Text,
@@ -142,7 +139,7 @@ enum Kind {
 }
 
 impl Kind {
-    /// The kinds that a schema without alternatives says; none if it says none.
+    /// Returns the kinds of a schema without alternatives, or `None` if it names none.
     fn all_of(schema: &Value) -> Option<Vec<Self>> {
         match schema.get("type")? {
             Value::Array(names) => names.iter().map(|name| Kind::of(name.as_str()?, schema)).collect(),
@@ -204,7 +201,7 @@ impl Kind {
         }
     }
 
-    /// The number that a text stands for that is none in TOML, such as `.5`, `5.` or `05`.
+    /// Returns the number meant by a text that is no TOML number, such as `.5`, `5.` or `05`.
     fn meant(&self, value: &Value) -> Option<String> {
         let number = value.as_str()?.parse::<f64>().ok().filter(|number| number.is_finite())?;
         match self {

@@ -34,7 +34,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Configs that are part of the program: name and text.
+/// The configs that are part of the program: name and text.
 pub const BUILT_IN: [(&str, &str); 6] = [
     ("quickstart.toml", include_str!("../../configs/quickstart.toml")),
     ("zero_one.toml", include_str!("../../configs/zero_one.toml")),
@@ -44,69 +44,68 @@ pub const BUILT_IN: [(&str, &str); 6] = [
     ("gaits.toml", include_str!("../../configs/gaits.toml")),
 ];
 
-/// Largest whole number of a config, its seed's, too: TOML's are signed.
+/// The largest whole number of a config, including seeds: TOML's are signed.
 pub const MAX_NUMBER: u64 = i64::MAX as u64;
 
-/// Largest offset of the QD score either way \[voxel lengths\].
+/// The largest absolute offset of the QD score \[voxel lengths\].
 const MAX_OFFSET: f64 = 1e9;
 
-/// Everything a run depends on. Every key but `task` and `data` has a default.
+/// Everything a run depends on. Every key except `task` and `data` has a default.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Config {
-    /// Seed of all chance. Default 1.
+    /// The seed of all random numbers. Default 1.
     #[serde(default = "one")]
     pub seed: u64,
-    /// Generations, the first (random) one included. Default 30,000, the paper's.
+    /// The number of generations, including the first (random) one. Default 30,000, the paper's.
     #[serde(default = "paper_generations")]
     pub generations: u64,
-    /// Size of bodies and which are valid.
+    /// The size of bodies and the condition for valid ones.
     #[serde(default)]
     pub body: BodyConfig,
-    /// Which classes are to be told apart.
+    /// The classes to tell apart.
     pub task: TaskConfig,
-    /// Which images.
+    /// The images.
     pub data: DataConfig,
-    /// From image to stimulus.
+    /// The conversion from image to stimulus.
     #[serde(default)]
     pub stimulus: StimulusParams,
-    /// How images are shown.
+    /// The presentation of images.
     #[serde(default)]
     pub protocol: Protocol,
-    /// Sizes of generations.
+    /// The sizes of generations.
     #[serde(default)]
     pub map_elites: EmitterParams,
-    /// How the archive is measured.
+    /// The settings of the archive.
     #[serde(default)]
     pub archive: ArchiveConfig,
-    /// Sizes of mutations.
+    /// The sizes of mutations.
     #[serde(default)]
     pub genome: MutationParams,
     /// Savings that change no archive.
     #[serde(default)]
     pub savings: Savings,
-    /// When the run is saved.
+    /// The times at which the run is saved.
     #[serde(default)]
     pub checkpoint: CheckpointConfig,
-    /// How robots are evaluated. Left out of files where it is the default.
+    /// The evaluation of robots. Files omit it if it is the default.
     #[serde(default, skip_serializing_if = "EvaluationConfig::is_default")]
     pub evaluation: EvaluationConfig,
-    /// How robots are chosen on images that they were not trained on. Left out of files where it is
-    /// the default.
+    /// The choice of robots on validation images. Files omit it if it is the default.
     #[serde(default, skip_serializing_if = "ValidationConfig::is_default")]
     pub validation: ValidationConfig,
-    /// How gaits are taught by `morphcog train`. Left out of files where it is the default.
+    /// The training of gaits by `morphcog train`. Files omit it if it is the default.
     #[serde(default, skip_serializing_if = "TrainConfig::is_default")]
     pub train: TrainConfig,
-    /// Constants of the simulator.
+    /// The constants of the simulator.
     #[serde(default)]
     pub physics: Physics,
 }
 
-/// Keys in dots, with their values.
+/// Dotted keys with their values.
 pub type Settings = BTreeMap<String, toml::Value>;
 
-/// The keys in which two settings differ, with both values as text, in the keys' order.
+/// Returns the keys in which two settings differ, with both values as text, in the keys' order.
 pub(crate) fn differing(there: &Settings, now: &Settings) -> Vec<(String, String, String)> {
     let value =
         |settings: &Settings, key: &str| settings.get(key).map_or("not set".to_string(), ToString::to_string);
@@ -116,7 +115,7 @@ pub(crate) fn differing(there: &Settings, now: &Settings) -> Vec<(String, String
     keys.into_iter().filter(differs).map(with_values).collect()
 }
 
-/// Tables within tables as keys in dots, below `name`.
+/// Flattens nested tables to dotted keys, below `name`.
 pub(crate) fn flatten(name: &str, value: toml::Value, settings: &mut Settings) {
     match value {
         toml::Value::Table(table) => {
@@ -137,15 +136,15 @@ fn paper_generations() -> u64 {
     30_000
 }
 
-/// Size of bodies and which are valid: section `[body]`.
+/// The size of bodies and the condition for valid ones: section `[body]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct BodyConfig {
-    /// Rows. Default 14.
+    /// The number of rows. Default 14.
     pub height: usize,
-    /// Columns. Default 14.
+    /// The number of columns. Default 14.
     pub width: usize,
-    /// Least number of muscle voxels. Default 3.
+    /// The minimum number of muscle voxels. Default 3.
     pub min_muscles: usize,
 }
 
@@ -155,24 +154,24 @@ impl Default for BodyConfig {
     }
 }
 
-/// Which images: section `[data]`.
+/// The images: section `[data]`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DataConfig {
-    /// "mnist", "fashion-mnist", "builtin", or a name of one's own.
+    /// The dataset: "mnist", "fashion-mnist", "builtin", or a name of your own.
     pub dataset: String,
-    /// Folder of its files, if neither `--data` nor `MORPHCOG_DATA` says one, nor the run where
-    /// they were. Default `data/<dataset>`.
+    /// The folder of its files, if neither `--data` nor `MORPHCOG_DATA` gives one, nor the run
+    /// where they were. Default `data/<dataset>`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dir: Option<PathBuf>,
-    /// Whether rows and columns of the images in the files are exchanged, for images that are stored
-    /// mirrored and turned. Default: those of EMNIST, which is known by its names, are.
+    /// True to swap rows and columns of the images in the files, for images that are stored
+    /// mirrored and turned. Default: true for EMNIST, recognised by its names.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub transpose: Option<bool>,
-    /// Training images by index, in the order in which a sequential rollout sees them.
+    /// The training images by index, in the order of a sequential rollout.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub train_images: Option<Vec<usize>>,
-    /// Without `train_images`: this many of each class, drawn by the run's seed. Default 1.
+    /// Without `train_images`: the number of images per class, drawn by the run's seed. Default 1.
     #[serde(default = "one_image")]
     pub images_per_class: usize,
     /// The built-in digits, for `dataset = "builtin"`.
@@ -181,8 +180,8 @@ pub struct DataConfig {
 }
 
 impl DataConfig {
-    /// The same with another dataset, for which its folder, how its files are read and its images
-    /// mean nothing; its own changes nothing.
+    /// Returns the settings for another dataset, without this one's folder, file layout and images.
+    /// For the same dataset, nothing changes.
     #[must_use]
     pub(crate) fn of(&self, dataset: &str) -> Self {
         if dataset == self.dataset {
@@ -202,27 +201,27 @@ fn one_image() -> usize {
     1
 }
 
-/// How the archive is measured: section `[archive]`.
+/// The settings of the archive: section `[archive]`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ArchiveConfig {
-    /// Fitness that counts as nothing in the QD score \[voxel lengths\]; a smaller one counts less
-    /// than nothing. Default 0.
+    /// The fitness that counts as zero in the QD score \[voxel lengths\]; smaller ones count
+    /// negatively. Default 0.
     pub qd_offset: f64,
-    /// Elites of each task that stay in the archive after each generation, the fittest. Default:
-    /// all. Few make a search greedy.
+    /// The number of elites per task that stay in the archive after each generation, the fittest.
+    /// Default: all. Smaller values make the search greedy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub keep: Option<usize>,
 }
 
-/// When the run is saved: section `[checkpoint]`. Whichever comes first.
+/// The times at which the run is saved: section `[checkpoint]`. Whichever comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CheckpointConfig {
     /// Generations between two checkpoints. Default 1000; larger values lose more at a power cut.
     pub generations: u64,
-    /// Seconds between two checkpoints; more where writing one takes more than a fiftieth of that.
-    /// Default 10.
+    /// Seconds between two checkpoints; longer if writing takes over a fiftieth of that. Default
+    /// 10.
     pub seconds: f64,
 }
 
@@ -232,7 +231,7 @@ impl Default for CheckpointConfig {
     }
 }
 
-/// A number at or below a place that is too large for a file, with its key.
+/// Returns a number at or below a place that is too large for a file, with its key.
 fn too_large(place: &str, value: &serde_json::Value) -> Option<(String, u64)> {
     use serde_json::Value::{Array, Number, Object};
     let below = |key: &str| match place {
@@ -250,20 +249,20 @@ fn too_large(place: &str, value: &serde_json::Value) -> Option<(String, u64)> {
 }
 
 impl Config {
-    /// Reads a config: a file (JSON if its name ends in `.json`, else TOML) or, if there is none,
-    /// the built-in config of that name; then sets `overrides` (`key=value`, keys as
+    /// Reads a config: a file (JSON if its name ends in `.json`, else TOML) or, without one, the
+    /// built-in config of that name. Then applies `overrides` (`key=value`, with keys such as
     /// `map_elites.parents`).
     ///
     /// # Errors
-    /// What is wrong, with file, line and key.
+    /// Returns an error, with file, line and key, if the config is missing or invalid.
     pub fn load(name: &str, overrides: &[String]) -> Result<Self, Error> {
         Config::load_from(Path::new(""), name, overrides)
     }
 
-    /// The same with the file looked for from a folder on.
+    /// Reads a config whose path is relative to a folder.
     ///
     /// # Errors
-    /// As [`Config::load`].
+    /// Returns the errors of [`Config::load`].
     pub(crate) fn load_from(folder: &Path, name: &str, overrides: &[String]) -> Result<Self, Error> {
         let built_in =
             || BUILT_IN.iter().find(|(own, _)| *own == name || own.strip_suffix(".toml") == Some(name));
@@ -292,10 +291,10 @@ impl Config {
         Config::parse(&text, name, overrides)
     }
 
-    /// Reads a config's text; `name` stands in messages and, by its ending, tells JSON from TOML.
+    /// Parses a config. `name` appears in messages; its extension tells JSON from TOML.
     ///
     /// # Errors
-    /// As [`Config::load`].
+    /// Returns the errors of [`Config::load`].
     pub fn parse(text: &str, name: &str, overrides: &[String]) -> Result<Self, Error> {
         let format = Format::of(Path::new(name));
         let config: Config = reading::read(text, format, name).map_err(|error| {
@@ -309,13 +308,13 @@ impl Config {
         })
     }
 
-    /// The config as TOML, every key with its value.
+    /// Returns the config as TOML, every key with its value.
     pub fn to_toml(&self) -> String {
         toml::to_string_pretty(self).expect("every field is a number, text, list or table, which TOML has")
     }
 
-    /// What the results of a generation depend on: without how many there are, and what changes no
-    /// result.
+    /// Returns the settings that a generation's results depend on: without the number of
+    /// generations and settings that change no result.
     pub(crate) fn essence(&self) -> Config {
         Config {
             generations: 1,
@@ -327,7 +326,7 @@ impl Config {
         }
     }
 
-    /// All keys that results depend on, as `map_elites.parents`, with their values.
+    /// Returns all keys that results depend on, such as `map_elites.parents`, with their values.
     pub fn settings(&self) -> Settings {
         let root = toml::Value::try_from(self.essence());
         let mut settings = Settings::new();
@@ -339,33 +338,33 @@ impl Config {
         settings
     }
 
-    /// How several robots see images together: the first one's config, but with the
-    /// [`StimulusParams::together`] of all. `None` of no config.
+    /// Returns the common config of several robots: the first one's, with the
+    /// [`StimulusParams::together`] of all, or `None` without a config.
     pub(crate) fn together<'a>(all: impl IntoIterator<Item = &'a Config> + Clone) -> Option<Self> {
         let stimulus = StimulusParams::together(all.clone().into_iter().map(|config| config.stimulus))?;
         all.into_iter().next().map(|first| Config { stimulus, ..first.clone() })
     }
 
-    /// What bodies evolution makes.
+    /// Returns the specification of the bodies that evolve.
     pub fn body_spec(&self) -> BodySpec {
         let BodyConfig { height, width, min_muscles } = self.body;
         BodySpec { height, width, min_muscles }
     }
 
-    /// The tasks.
+    /// Returns the tasks.
     ///
     /// # Errors
-    /// If the section `[task]` makes none.
+    /// Returns an error if the section `[task]` defines none.
     pub fn grouping(&self) -> Result<Grouping, Error> {
         self.task.grouping()
     }
 
-    /// All classes of the task, in its order.
+    /// Returns all classes of the task, in its order.
     pub fn classes(&self) -> Vec<u8> {
         self.task.classes()
     }
 
-    /// Checks what a type cannot.
+    /// Checks what types cannot.
     pub(crate) fn validate(&self) -> Result<(), Error> {
         let refuse = |key: &str, found: String, expected: &str| Err(Error::value(key, found, expected));
         let numbers = serde_json::to_value(self).map_err(|error| Error::input(error.to_string()))?;
@@ -426,7 +425,7 @@ impl Config {
             let expected = format!("−{MAX_COLUMN} to {MAX_COLUMN}");
             return refuse("protocol.start_column", self.protocol.start_column.to_string(), &expected);
         }
-        // Sums over an archive must stay finite: files cannot hold what is not.
+        // Sums over an archive must stay finite, because files cannot hold other values.
         if self.archive.qd_offset.is_nan() || self.archive.qd_offset.abs() > MAX_OFFSET {
             let expected = format!("a number from −{MAX_OFFSET} to {MAX_OFFSET}");
             return refuse("archive.qd_offset", self.archive.qd_offset.to_string(), &expected);

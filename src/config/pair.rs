@@ -1,22 +1,22 @@
-//! Reading two of a kind.
+//! Reading of pairs.
 
 use serde::de::{Deserialize, Deserializer, Error};
 
-/// Two of a kind, for `deserialize_with`. An array's own reader leaves a third to the format, and
-/// TOML's passes it over.
+/// Reads a pair, for `deserialize_with`. Serde's reader of arrays leaves a third item to the
+/// format, and TOML ignores it.
 ///
 /// # Errors
-/// Of a list that is shorter or longer, or what is wrong with an item.
+/// Returns an error if the list has another length, or an item is invalid.
 pub fn read<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<[T; 2], D::Error> {
     let items = Vec::<T>::deserialize(from)?;
     let count = items.len();
     items.try_into().map_err(|_| D::Error::custom(format!("expected a list of two, found {count}")))
 }
 
-/// The same where there may be none.
+/// Reads an optional pair.
 ///
 /// # Errors
-/// As [`read`].
+/// Returns the errors of [`read`].
 pub fn read_some<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
     from: D,
 ) -> Result<Option<[T; 2]>, D::Error> {

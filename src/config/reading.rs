@@ -11,7 +11,6 @@ use serde_json::Value;
 use serde_path_to_error::Segment;
 use std::path::Path;
 
-/// How a config is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Format {
     Toml,
@@ -19,7 +18,7 @@ pub(crate) enum Format {
 }
 
 impl Format {
-    /// The format of a file with this name: JSON if it ends in `.json`, else TOML.
+    /// Returns the format of a file name: JSON if it ends in `.json`, else TOML.
     pub(crate) fn of(name: &Path) -> Self {
         let is_json = name.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
         if is_json { Format::Json } else { Format::Toml }
@@ -63,10 +62,10 @@ pub(crate) fn read<T: Serialize + DeserializeOwned + JsonSchema>(
     }
 }
 
-/// Why a file is not read.
+/// The reason why a file is not read.
 struct Refusal {
     line: Option<usize>,
-    /// Where in what the file holds, if it holds anything.
+    /// The path within the file's content, if it has any.
     path: Option<serde_path_to_error::Path>,
     message: String,
 }
@@ -76,7 +75,7 @@ impl Refusal {
         Refusal { line, path: None, message: message.to_string() }
     }
 
-    /// The error; a mismatch says more than the message of the reader.
+    /// Converts to an error; a mismatch explains more than the reader's message.
     fn in_file(self, name: &str, mismatch: Option<Mismatch>) -> Error {
         let Refusal { line, path, message } = self;
         let line = line.map_or(String::new(), |line| format!(":{line}"));
@@ -90,7 +89,7 @@ impl Refusal {
     }
 }
 
-/// What to say where a number of TOML has no digit before or behind its point, as `.5` and `5.`.
+/// Explains a TOML number without a digit before or after its point, such as `.5` and `5.`.
 fn half_a_number(text: &str, span: Option<std::ops::Range<usize>>) -> Option<&'static str> {
     let place = span?.start;
     let is_part = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '+' | '-' | '_');
@@ -104,8 +103,8 @@ fn half_a_number(text: &str, span: Option<std::ops::Range<usize>>) -> Option<&'s
     is_half.then_some("expected digits before and after the point of a number, as in 0.5")
 }
 
-/// The key of a table that is given as a list: serde takes a list for the values of a table's keys
-/// in their order, which nobody means who writes `[[body]]`.
+/// Returns the key of a table that is given as a list. Serde reads a list as the values of a
+/// table's keys in order, which nobody means by `[[body]]`.
 fn listed<T: Serialize>(given: &Value, settings: &T) -> Option<String> {
     fn within(given: &Value, read: &Value) -> Option<Vec<String>> {
         let keyed =
@@ -142,7 +141,7 @@ pub(crate) fn read_json_list<T: DeserializeOwned>(text: &str, name: &str) -> Res
 }
 
 fn json_object<T: DeserializeOwned>(text: &str) -> Result<T, Refusal> {
-    // A list would be taken for an object without keys.
+    // Serde would read a list as an object without keys.
     let begin = text.len() - text.trim_start().len();
     if !text[begin..].starts_with('{') {
         return Err(Refusal::new(line_at(text, Some(begin..begin)), "expected a JSON object, {…}"));
@@ -155,7 +154,7 @@ fn json<T: DeserializeOwned>(text: &str) -> Result<T, Refusal> {
     let value = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
         let line = Some(error.inner().line()).filter(|&line| line > 0);
         let message = error.inner().to_string();
-        // serde_json ends its messages with the place, which is said already.
+        // serde_json ends its messages with the place, which is already there.
         let message = message.split(" at line ").next().expect("a split text has a first piece");
         Refusal { line, path: Some(error.path().clone()), message: message.to_string() }
     })?;
@@ -163,14 +162,14 @@ fn json<T: DeserializeOwned>(text: &str) -> Result<T, Refusal> {
     tail.map(|()| value)
 }
 
-/// Reads a JSON file of ours of a `format`, not of a version newer than `newest`.
+/// Reads morphcog's JSON file of a `format`, in a version up to `newest`.
 pub(crate) fn read_versioned<T: DeserializeOwned>(
     text: &str,
     name: &str,
     format: &str,
     newest: u32,
 ) -> Result<T, Error> {
-    /// What every version has, to tell a newer or foreign file before its details are refused.
+    /// The part common to all versions, to reject a newer or foreign file before its details.
     #[derive(serde::Deserialize)]
     struct Head {
         format: Option<String>,
@@ -189,8 +188,8 @@ pub(crate) fn read_versioned<T: DeserializeOwned>(
     read_json(text, name)
 }
 
-/// Reads settings, a JSON file if its name ends in `.json`, else TOML; keys that are not in it have
-/// their defaults. Then sets `overrides` (`key=value`), and checks what types cannot.
+/// Reads settings, JSON if the name ends in `.json`, else TOML; missing keys have their defaults.
+/// Then applies `overrides` (`key=value`), and checks what types cannot.
 pub(crate) fn load<T: Serialize + DeserializeOwned + JsonSchema + Default>(
     path: Option<&Path>,
     overrides: &[String],
@@ -207,7 +206,7 @@ pub(crate) fn load<T: Serialize + DeserializeOwned + JsonSchema + Default>(
     changed(settings, overrides, check, |error| placed(error, &text, format, &name))
 }
 
-/// The key at a path, items of lists by their number from 1; empty for the whole.
+/// Returns the key at a path, with list items numbered from 1; empty for the whole.
 fn key_of(path: &serde_path_to_error::Path) -> String {
     let parts = path.iter().filter_map(|segment| match segment {
         Segment::Map { key } => Some(key.clone()),
@@ -221,15 +220,15 @@ fn line_at(text: &str, span: Option<std::ops::Range<usize>>) -> Option<usize> {
     Some(text.get(..span?.start)?.matches('\n').count() + 1)
 }
 
-/// An error with where in a file its key stands, or the innermost table around it that the text
-/// has: the file and, in TOML, the line.
+/// Adds to an error the place of its key, or of the innermost enclosing table in the text: the file
+/// and, in TOML, the line.
 pub(crate) fn placed(error: Error, text: &str, format: Format, name: &str) -> Error {
     let line = error.key.as_deref().filter(|_| format == Format::Toml).and_then(|key| line_of(text, key));
     let place = line.map_or(name.to_string(), |line| format!("{name}:{line}"));
     error.in_place(&place)
 }
 
-/// The line of a key, or of the innermost table around it that the text has.
+/// Returns the line of a key, or of the innermost enclosing table in the text.
 fn line_of(text: &str, key: &str) -> Option<usize> {
     let table = toml::de::DeTable::parse(text).ok()?.into_inner();
     let mut parts = key.split('.');
@@ -245,8 +244,8 @@ fn line_of(text: &str, key: &str) -> Option<usize> {
     line_at(text, Some(value.span()))
 }
 
-/// Settings with `overrides` set, checked. An error about a key blames the last override that sets it;
-/// `in_file` adds the place in the file to an error that no override is to blame for.
+/// Applies `overrides` to settings, and checks them. An error about a key blames the last override
+/// that sets it; otherwise `in_file` adds the place in the file.
 pub(crate) fn changed<T: Serialize + DeserializeOwned + JsonSchema>(
     settings: T,
     overrides: &[String],
@@ -258,7 +257,7 @@ pub(crate) fn changed<T: Serialize + DeserializeOwned + JsonSchema>(
     }
     let mut root = match toml::Value::try_from(&settings) {
         Ok(root) => root,
-        // Only a number from JSON can be too large for TOML; the check says which one it is.
+        // Only a number from JSON can be too large for TOML; the check names it.
         Err(error) => {
             return Err(in_file(check(&settings).err().unwrap_or(Error::input(error.to_string()))));
         }
@@ -269,7 +268,7 @@ pub(crate) fn changed<T: Serialize + DeserializeOwned + JsonSchema>(
     overridden(root).and_then(|settings| check(&settings).map(|()| settings)).map_err(|error| {
         let culprit = |key: &str| overrides.iter().rfind(|assignment| sets(assignment, key));
         let key = error.key.as_deref().filter(|key| !key.is_empty());
-        // What is missing can only be what was unset.
+        // A missing key can only be one that was unset.
         let unset = || overrides.iter().rfind(|assignment| assignment.trim_end().ends_with('='));
         match key.map_or_else(unset, culprit) {
             Some(assignment) => {
@@ -281,7 +280,7 @@ pub(crate) fn changed<T: Serialize + DeserializeOwned + JsonSchema>(
     })
 }
 
-/// Settings from their keys.
+/// Creates settings from their keys.
 fn overridden<T: Serialize + DeserializeOwned + JsonSchema>(root: toml::Value) -> Result<T, Error> {
     let given = serde_json::to_value(&root).ok();
     let settings: T = serde_path_to_error::deserialize(root).map_err(|error| {
@@ -296,7 +295,7 @@ fn overridden<T: Serialize + DeserializeOwned + JsonSchema>(root: toml::Value) -
     }
 }
 
-/// Whether an override sets a key: itself, the table it is of, or a key of that table.
+/// Returns true if an override sets a key: itself, its table, or a key of its table.
 pub(crate) fn sets(assignment: &str, key: &str) -> bool {
     let set = assignment.split_once('=').map_or(assignment, |(set, _)| set).trim();
     let is_within = |inner: &str, outer: &str| {
@@ -305,12 +304,11 @@ pub(crate) fn sets(assignment: &str, key: &str) -> bool {
     is_within(set, key) || is_within(key, set)
 }
 
-/// Most parts of a key: many times what any has; tables in tables need the stack.
+/// The maximum number of parts in a key, far above any real key's: nested tables need stack.
 const DEEPEST: usize = 16;
 
-/// Changes one key: `map_elites.parents=10`, or `task.groups.2=[1]` for the second of a list;
-/// without a value, `keep=`, it has its default again. What follows the sign is read as TOML, and
-/// as plain text if it is none.
+/// Changes one key: `map_elites.parents=10`, or `task.groups.2=[1]` for the second item of a list.
+/// Without a value, `keep=`, it restores the default. The value is TOML, or else plain text.
 fn set<T: JsonSchema>(root: &mut toml::Value, assignment: &str) -> Result<(), String> {
     let parts = assignment.split_once('=').map(|(key, text)| (key.trim(), text.trim()));
     let Some((key, text)) = parts.filter(|(key, _)| !key.is_empty()) else {
@@ -346,7 +344,7 @@ fn set<T: JsonSchema>(root: &mut toml::Value, assignment: &str) -> Result<(), St
                 let count = list.len();
                 let index = part.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
                 let Some(index) = index.filter(|&index| index < count) else {
-                    // Not a list at all, perhaps.
+                    // Perhaps it is no list at all.
                     is_known::<T>(&before)?;
                     return Err(match count {
                         0 => format!("there is no {before} {part}: there is none at all"),
@@ -376,7 +374,7 @@ fn is_number(part: &str) -> bool {
     !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit())
 }
 
-/// Whether settings have a key, which may be at its default and left out.
+/// Checks that settings have a key, which may be at its default and omitted.
 fn is_known<T: JsonSchema>(key: &str) -> Result<(), String> {
     match unknown_part::<T>(key) {
         None => Ok(()),
@@ -449,7 +447,7 @@ mod tests {
             "set inner=[3]: inner: expected a table, found a list"
         );
         assert_eq!(set("inner.list=[3]").unwrap().inner.list, [3.0]);
-        // Nor is a number.
+        // Neither is a number.
         let error = set("inner=3").unwrap_err().message;
         assert!(error.ends_with("expected a table"), "{error}");
     }
@@ -464,7 +462,7 @@ mod tests {
         assert!(json_error("{\"name\": \"a\"}\n}").starts_with("own.json:2: "));
         assert!(json_error("{\"name\": \"a\"").starts_with("own.json:1: "));
         assert!(json_error("{\"nam\": \"a\"}").contains("nam"));
-        // Cut off, or no object at all: nothing of the reader's own words.
+        // Cut off, or no object at all: the messages are not the reader's own.
         assert_eq!(json_error("{"), "own.json:1: EOF while parsing an object");
         assert_eq!(json_error("{\"name\": \"a\",}"), "own.json:1: trailing comma");
         for text in ["", " [\"a\"]", "7"] {
@@ -484,7 +482,7 @@ mod tests {
         assert_eq!(place("seed"), "own.toml:1: seed: wrong");
         assert_eq!(line("body.height"), "own.toml:5");
         assert_eq!(line("item.2.keep"), "own.toml:12");
-        // Where the key itself is missing, or the whole table is meant.
+        // The key itself is missing, or the whole table is meant.
         assert_eq!(line("item.2.generations"), "own.toml:10");
         assert_eq!(line("body.depth"), "own.toml:3");
         assert_eq!(line("task"), "own.toml:13");
@@ -495,7 +493,7 @@ mod tests {
         );
     }
 
-    /// What is said of an [`Outer`] whose number is not below the first of its list, or negative.
+    /// Returns what is blamed for an [`Outer`] with a negative number or one not below its first.
     fn blamed(count: u8, list: &[f64], overrides: &[&str]) -> String {
         let inner = Inner { count, list: list.to_vec(), maybe: None };
         let overrides: Vec<String> = overrides.iter().map(|text| text.to_string()).collect();
@@ -520,17 +518,17 @@ mod tests {
         assert_eq!(blamed(9, &[5.0], &[]), file);
         assert_eq!(blamed(9, &[5.0], &["name=b"]), file, "one that changes nothing of it");
         assert_eq!(blamed(3, &[5.0], &["name=b", "inner.count=9", "inner.maybe=1"]), "set inner.count=9");
-        // By a key that none of them sets.
+        // The key is one that no override sets.
         assert_eq!(blamed(3, &[5.0], &["inner.list=[2]", "name=b"]), file);
-        // Bad only together: the one that the message is about; and the later one of a key.
+        // Bad only together: blames the one that the message is about, and the later one of a key.
         assert_eq!(blamed(3, &[9.0], &["inner.count=5", "inner.list=[4]"]), "set inner.count=5");
         assert_eq!(blamed(3, &[9.0], &["inner.list=[4]", "inner.count=5"]), "set inner.count=5");
         assert_eq!(blamed(3, &[9.0], &["inner.count=10", "inner.count=11"]), "set inner.count=11");
         assert_eq!(blamed(3, &[9.0], &["inner.count=9", "inner.count=9"]), "set inner.count=9");
-        // Of two that are bad, that of which the message is.
+        // Of two bad ones, blames the one that the message is about.
         assert_eq!(blamed(3, &[9.0], &["inner.count=9", "inner.maybe=-1"]), "set inner.count=9");
         assert_eq!(blamed(3, &[9.0], &["inner.maybe=-1", "inner.count=9"]), "set inner.count=9");
-        // One that a later one mends is not bad.
+        // An override that a later one corrects is not bad.
         let mended = ["inner.count=9", "inner.maybe=-1", "inner.count=1"];
         assert_eq!(blamed(3, &[9.0], &mended), "set inner.maybe=-1");
         for wrong in ["inner.cont=1", "inner.cont=", "inner.count=x", "inner.list.2=1", "inner.list.2="] {
@@ -613,7 +611,7 @@ mod tests {
         assert!(set("name=").unwrap_err().message.contains("missing field `name`"));
         assert!(set("inner.list.3=7").unwrap_err().message.contains("from 1 to 2"));
         assert!(set("inner.list.0=7").unwrap_err().message.contains("from 1 to 2"));
-        // What is at its default already may be left out of what is written.
+        // Writers may omit keys at their defaults.
         let bare = Outer { name: "a".to_string(), inner: Inner::default() };
         let bare = changed(bare.clone(), &["inner.maybe=".to_string()], |_| Ok(()), |error| error);
         assert_eq!(bare.unwrap().inner, Inner::default());

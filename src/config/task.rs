@@ -6,27 +6,26 @@ use crate::task::grouping::Grouping;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Which classes are to be told apart: section `[task]`, either `groups` or `splits`.
+/// The classes to tell apart: section `[task]`, either `groups` or `splits`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TaskConfig {
-    /// One task: two groups of classes that are to walk opposite ways.
+    /// One task: two groups of classes that should walk opposite ways.
     #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "pair::read_some")]
     pub groups: Option<[Vec<u8>; 2]>,
-    /// All ways to split these classes in two groups; the task a robot performs is a dimension of
-    /// the archive.
+    /// All ways to split these classes into two groups; the task that a robot performs is a
+    /// dimension of the archive.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub splits: Option<Vec<u8>>,
-    /// With `splits`: one more bin for robots that walk the same way for all classes, as in the
-    /// published code.
+    /// With `splits`: one more bin for robots that always walk one way, as in the published code.
     pub same_way_bin: bool,
 }
 
 impl TaskConfig {
-    /// The tasks.
+    /// Returns the tasks.
     ///
     /// # Errors
-    /// If the section `[task]` makes none.
+    /// Returns an error if the section `[task]` defines none.
     pub fn grouping(&self) -> Result<Grouping, Error> {
         let TaskConfig { groups, splits, same_way_bin } = self;
         let grouping = match (groups, splits) {
@@ -43,14 +42,14 @@ impl TaskConfig {
         grouping.map_err(|error| Error::at_key("task", error))
     }
 
-    /// All classes of the task, in its order.
+    /// Returns all classes of the task, in its order.
     pub fn classes(&self) -> Vec<u8> {
         let TaskConfig { groups, splits, .. } = self;
         groups.iter().flatten().chain(splits).flatten().copied().collect()
     }
 
-    /// The tasks of several runs: their own, if these are the same, else all splits of their classes,
-    /// if each has some of these. `None` if they tell other classes apart, or of no run.
+    /// Returns the common tasks of several runs: their own if equal, else all splits of their
+    /// classes if each run has some of these. Returns `None` for different classes, or no runs.
     pub(crate) fn together<'a>(all: impl IntoIterator<Item = &'a TaskConfig> + Clone) -> Option<Self> {
         let first = all.clone().into_iter().next()?;
         if all.clone().into_iter().all(|task| task == first) {
@@ -89,7 +88,7 @@ mod tests {
         let published = splits(&[0, 1, 2, 3], true);
         assert_eq!(TaskConfig::together([&three, &published]), Some(published.clone()));
         assert_eq!(TaskConfig::together([]), None);
-        // Other classes, and groups the other way round, whose names are no splits'.
+        // Other classes; and reversed groups, whose names are not those of splits.
         assert_eq!(TaskConfig::together([&three, &groups(&[0], &[1])]), None);
         assert_eq!(TaskConfig::together([&three, &groups(&[1, 3], &[0, 2])]), None);
     }

@@ -6,36 +6,36 @@ use crate::task::perturbation::ByTurns;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How gaits are taught by `morphcog train`: section `[train]`.
+/// The training of gaits by `morphcog train`: section `[train]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrainConfig {
-    /// Training images of each class that the model sees; only a few of them are shown to robots.
-    /// Default 2000, or three quarters of the images of the scarcest class if that is less: more
-    /// make designs general, and cost little.
+    /// The training images of each class for the model; robots walk under only a few of them.
+    /// Default 2000, or three quarters of the scarcest class if that is less: more make designs
+    /// general, and cost little.
     pub images_per_class: usize,
-    /// Rollouts with random images that measure a gait's response. Default 300: with fewer than
+    /// The rollouts with random images that measure a gait's response. Default 300: with fewer than
     /// two for each soft voxel and sensor the slopes are mostly noise.
     pub random_images: usize,
-    /// Windows of the images that are tried for each gait, that of `stimulus.margin` first: the model
-    /// says which serves the task best, and the robot sees that one. Default 0: only that of
-    /// `stimulus.margin`. More than 0 want the reduction "area". They cost no rollouts.
+    /// The windows of the images tried for each gait, that of `stimulus.margin` first; the robot
+    /// gets the one that the model finds best for the task. Default 0: only that of
+    /// `stimulus.margin`. Values above 0 require the reduction "area". They cost no rollouts.
     #[serde(skip_serializing_if = "is_zero")]
     pub windows: usize,
-    /// Rounds in which the response is measured around the latest design, and the lesson is solved
-    /// again. Default 6: more seldom help. 0: the robot keeps its own soft voxels and sensors, and is
-    /// only refined; of several robots, the fittest.
+    /// The rounds in which the response is measured around the latest design, and the design
+    /// problem is solved again. Default 6: more seldom help. With 0, the robot keeps its own soft
+    /// voxels and sensors, and is only refined; of several robots, the fittest.
     pub rounds: usize,
-    /// Training images that a round shows. Default 120: with fewer, slopes are noisier, and the
-    /// constant is off.
+    /// The training images per round. Default 120: fewer make slopes noisier and the constant
+    /// wrong.
     pub images: usize,
-    /// Training images on which designs and challengers are compared: at least one of every class,
-    /// of both groups by turns. Default 400: with fewer, small gains cannot be told from chance.
+    /// The training images on which designs and challengers compete: at least one of every class,
+    /// the groups alternating. Default 400: with fewer, small gains look like chance.
     pub final_images: usize,
-    /// Bodies that challenge the best design, in sensors or in a few voxels of any material.
+    /// The bodies that challenge the best design, in sensors or in a few voxels of any material.
     /// Default 30; later ones win more seldom.
     pub challengers: usize,
-    /// Conditions under which images are shown in turn, so that designs do not depend on the first
+    /// The conditions that alternate between images, so that designs do not depend on the first
     /// touch of the ground or exploit length limits.
     pub perturbations: ByTurns,
 }
@@ -55,25 +55,25 @@ impl Default for TrainConfig {
     }
 }
 
-/// Least number of random images: with fewer, nothing can be left out for the cross-validation.
+/// The minimum number of random images: with fewer, cross-validation can leave nothing out.
 const LEAST_RANDOM_IMAGES: usize = 20;
 
-/// Most random images of a gait: what is known of each is kept in memory, and more show no more.
+/// The maximum number of random images of a gait: all are kept in memory, and more reveal no more.
 pub(crate) const MOST_RANDOM_IMAGES: usize = 100_000;
 
-/// Most windows of a gait: a minute of a core or so.
+/// The maximum number of windows of a gait: about a minute of a core.
 const MOST_WINDOWS: usize = 10_000;
 
-/// Most rows by which a start is raised, as in an audit.
+/// The maximum number of rows by which a start is raised, as in an audit.
 const MOST_ROWS: u32 = 100;
 
 impl TrainConfig {
-    /// Whether a file needs not say it.
+    /// Returns true if files may omit it.
     pub(crate) fn is_default(&self) -> bool {
         *self == TrainConfig::default()
     }
 
-    /// Checks what a type cannot.
+    /// Checks what types cannot.
     pub(crate) fn validate(&self) -> Result<(), Error> {
         let least = [
             ("images_per_class", self.images_per_class, 1),

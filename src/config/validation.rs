@@ -3,20 +3,19 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Least number of validation images.
+/// The minimum number of validation images.
 pub const LEAST: usize = 40;
 
-/// What messages say of the number of images that the section asks for, before it.
+/// The key of the number of images, for messages.
 pub(crate) const IMAGES_KEY: &str = "validation.images";
 
 /// Validation at a run's end: section `[validation]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ValidationConfig {
-    /// Images in all, evenly divided between the classes; none of them is trained on. Default 400.
+    /// The number of images, evenly divided between the classes; never trained on. Default 400.
     pub images: usize,
-    /// Robots of each task that are chosen by them at the run's end. Default 0: nothing is done
-    /// then.
+    /// The number of robots per task that they choose at the run's end. Default 0: no validation.
     pub best: usize,
 }
 
@@ -27,7 +26,7 @@ impl Default for ValidationConfig {
 }
 
 impl ValidationConfig {
-    /// Whether a file needs not say it.
+    /// Returns true if files may omit it.
     pub(crate) fn is_default(&self) -> bool {
         *self == ValidationConfig::default()
     }

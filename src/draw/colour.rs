@@ -1,5 +1,5 @@
-//! The colours of all pictures: the paper's, in tones that stay apart when shaded, with marks on
-//! voxels that also colour-blind eyes tell apart.
+//! The colours of all pictures: the paper's, in tones that stay apart when shaded. Marks on the
+//! voxels help colour-blind viewers tell materials apart.
 
 use crate::body::Material;
 
@@ -13,54 +13,54 @@ pub struct Colour {
 }
 
 impl Colour {
-    /// An opaque colour.
+    /// Creates an opaque colour.
     pub const fn new(red: u8, green: u8, blue: u8) -> Self {
         Colour { rgb: [red, green, blue], opacity: 255 }
     }
 
-    /// The same with another opacity.
+    /// Returns this colour with another opacity.
     pub const fn with_opacity(self, opacity: u8) -> Self {
         Colour { rgb: self.rgb, opacity }
     }
 
-    /// Its red, green and blue as `#rrggbb`.
+    /// Returns the colour without its opacity, as `#rrggbb`.
     pub fn hex(self) -> String {
         let [red, green, blue] = self.rgb;
         format!("#{red:02x}{green:02x}{blue:02x}")
     }
 
-    /// Gray of an intensity in [0, 1].
+    /// Returns the gray of an intensity in [0, 1].
     pub fn gray(intensity: f64) -> Self {
         let level = (255.0 * intensity.clamp(0.0, 1.0)).round() as u8;
         Colour::new(level, level, level)
     }
 }
 
-/// Sky behind the robot, and paper behind text.
+/// The sky behind the robot, and the paper behind text.
 pub const PAPER: Colour = Colour::new(255, 255, 255);
-/// Text and axes.
+/// The colour of text and axes.
 pub const INK: Colour = Colour::new(34, 36, 40);
-/// Text of less weight.
+/// The colour of secondary text.
 pub const FAINT: Colour = Colour::new(112, 116, 124);
-/// Ground.
+/// The ground.
 pub const GROUND: Colour = Colour::new(236, 233, 226);
-/// Lines on the ground.
+/// The lines on the ground.
 pub const GROUND_LINE: Colour = Colour::new(120, 112, 98);
-/// Lines between the columns and rows of the world, in the paper's look.
+/// The lines between the columns and rows of the world, in the paper's look.
 pub const GRID: Colour = Colour::new(228, 231, 236);
 /// The ground's voxels, in the paper's look.
 pub const PEG: Colour = Colour::new(72, 74, 80);
-/// Path of the centre of mass.
+/// The path of the centre of mass.
 pub const TRACE: Colour = Colour::new(178, 24, 158);
-/// Lines between voxels, where they are not see-through.
+/// The lines between voxels where they are opaque.
 pub const SEAM: Colour = Colour::new(226, 228, 232);
-/// Warnings.
+/// The colour of warnings.
 pub const ALARM: Colour = Colour::new(190, 20, 40);
 
 /// Areas (square voxel lengths) at which a voxel has the first, middle and last of its [`tones`].
 pub const TONE_AREAS: [f64; 3] = [0.5, 1.0, 1.6];
 
-/// A material's colours when small, at rest and large.
+/// Returns a material's colours when small, at rest and large.
 pub fn tones(material: Material) -> [[u8; 3]; 3] {
     match material {
         Material::Empty => [[255, 255, 255]; 3],
@@ -73,9 +73,9 @@ pub fn tones(material: Material) -> [[u8; 3]; 3] {
     }
 }
 
-/// Lines that mark a material where voxels are large enough to see them, in a voxel from −½ to ½, x to
-/// the right, y up: chevrons up and down for muscles, plus and minus for sensors. Colours alone
-/// cannot keep six materials apart at every shade for colour-blind eyes.
+/// Returns the lines that mark a material on large voxels, from −½ to ½, x to the right, y up:
+/// chevrons up and down for muscles, plus and minus for sensors. Colours alone cannot keep six
+/// materials apart at every shade for colour-blind viewers.
 pub fn mark(material: Material) -> &'static [&'static [[f64; 2]]] {
     match material {
         Material::Empty | Material::Rigid | Material::Soft => &[],
@@ -86,14 +86,14 @@ pub fn mark(material: Material) -> &'static [&'static [[f64; 2]]] {
     }
 }
 
-/// Width of a mark, in voxel lengths.
+/// The width of a mark, in voxel lengths.
 pub const MARK_EXTENT: f64 = 0.4;
 
-/// Width of a mark's lines, in voxel lengths.
+/// The width of a mark's lines, in voxel lengths.
 pub const MARK_WIDTH: f64 = 0.09;
 
-/// The colour of a material's mark on a voxel of some colour: a dark tone of the material's own on
-/// light voxels, a light one on dark ones.
+/// Returns the colour of a material's mark on a voxel of colour `on`: a dark tone of the material
+/// on light voxels, a light tone on dark ones.
 pub fn mark_colour(material: Material, on: Colour) -> Colour {
     let [[r, g, b], _, [red, green, blue]] = tones(material);
     let [on_red, on_green, on_blue] = on.rgb.map(f64::from);
@@ -103,8 +103,8 @@ pub fn mark_colour(material: Material, on: Colour) -> Colour {
     }
 }
 
-/// A point of a mark in a voxel whose corners are given clockwise from the top left; where y goes up
-/// or down is the corners' matter.
+/// Maps a point of a mark into a voxel whose corners are given clockwise from the top left. The
+/// corners decide whether y runs up or down.
 pub fn placed([x, y]: [f64; 2], [a, b, c, d]: [[f64; 2]; 4]) -> [f64; 2] {
     [0, 1].map(|k| {
         let (left, right) = ((a[k] + d[k]) / 2.0, (b[k] + c[k]) / 2.0);
@@ -113,7 +113,7 @@ pub fn placed([x, y]: [f64; 2], [a, b, c, d]: [[f64; 2]; 4]) -> [f64; 2] {
     })
 }
 
-/// A voxel's colour: its material's, darker the smaller its area (square voxel lengths) is now.
+/// Returns a voxel's colour: its material's, darker the smaller its area (square voxel lengths).
 pub fn shade(material: Material, area: f64) -> Colour {
     let [small, rest, large] = tones(material);
     let [low, middle, high] = TONE_AREAS;
@@ -122,7 +122,7 @@ pub fn shade(material: Material, area: f64) -> Colour {
     } else {
         (rest, large, (area - middle) / (high - middle))
     };
-    // A NaN area counts as the one at rest.
+    // A NaN area counts as the area at rest.
     let t = if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) };
     let mix = |k: usize| (f64::from(from[k]) + t * (f64::from(to[k]) - f64::from(from[k]))).round() as u8;
     Colour::new(mix(0), mix(1), mix(2))
@@ -143,13 +143,13 @@ mod tests {
             let areas = (0..=44).map(|i| 0.5 + 0.025 * f64::from(i));
             let levels: Vec<f64> = areas.map(|a| brightness(shade(material, a))).collect();
             assert!(levels.windows(2).all(|w| w[0] < w[1]), "{material:?} {levels:?}");
-            // Clearly visible: at least a fifth of the whole scale between small and large.
+            // Clearly visible: small and large differ by at least a fifth of the whole scale.
             assert!(levels[levels.len() - 1] - levels[0] > 51.0, "{material:?}");
         }
     }
 
-    /// Linear red, green and blue as eyes without one kind of cones see them (Machado et al. 2009,
-    /// severity 1): protanopia, deuteranopia, tritanopia.
+    /// Matrices from linear red, green and blue to what viewers without one kind of cone perceive
+    /// (Machado et al. 2009, severity 1): protanopia, deuteranopia, tritanopia.
     const BLIND: [[[f64; 3]; 3]; 3] = [
         [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
         [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
@@ -160,7 +160,7 @@ mod tests {
         [0, 1, 2].map(|k| (0..3).map(|i| matrix[k][i] * v[i]).sum())
     }
 
-    /// CIE L*a*b* (D65) of a colour as somebody sees it.
+    /// CIE L*a*b* (D65) of a colour as perceived by `eyes`.
     fn lab(colour: Colour, eyes: &[[f64; 3]; 3]) -> [f64; 3] {
         let linear = colour.rgb.map(|v| {
             let v = f64::from(v) / 255.0;
@@ -209,7 +209,7 @@ mod tests {
 
     #[test]
     fn the_colour_difference_is_that_of_its_authors() {
-        // Three pairs of their table.
+        // Three pairs from the paper's table.
         for (one, other, expected) in [
             ([50.0, 2.6772, -79.7751], [50.0, 0.0, -82.7485], 2.0425),
             ([50.0, 2.5, 0.0], [73.0, 25.0, -18.0], 27.1492),

@@ -1,33 +1,33 @@
-//! [`PictureError`]: why there is no picture; and files that are written whole.
+//! [`PictureError`]: the reasons why a picture cannot be made; and atomic writing of files.
 
 use crate::base::error::Error;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-/// Possible widths of pictures, pixels.
+/// The widths that a picture can have, pixels.
 pub const WIDTHS: RangeInclusive<u32> = 320..=4096;
 
-/// Why there is no picture.
+/// A reason why a picture cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum PictureError {
-    /// The recording does not hold what a picture needs.
+    /// The recording lacks something that a picture needs.
     #[error("the recording cannot be drawn: {0}")]
     Recording(&'static str),
-    /// The picture would be too small, too large or have no frame.
+    /// The picture would be too small or too large, or have no frame.
     #[error("a picture of {width} × {height} pixels is not possible; expected a width of {} … {} pixels",
             WIDTHS.start(), WIDTHS.end())]
     Size {
-        /// Pixels asked for.
+        /// The requested width, pixels.
         width: u32,
-        /// Pixels asked for, or that follow from the width.
+        /// The requested height, or the height that follows from the width, pixels.
         height: u32,
     },
     /// A figure would have no pixels or too many.
     #[error("a figure of {width} × {height} pixels is not possible; expected 1 … 16000 on each side")]
     Figure {
-        /// Pixels asked for.
+        /// The requested width, pixels.
         width: f64,
-        /// Pixels that follow.
+        /// The resulting height, pixels.
         height: f64,
     },
     /// The encoder refused.
@@ -39,9 +39,9 @@ pub enum PictureError {
     /// The file could not be written.
     #[error("could not write {}: {source}; check that the folder exists and is writable", path.display())]
     Write {
-        /// The file.
+        /// The path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// The error from the operating system.
         source: std::io::Error,
     },
 }
@@ -62,8 +62,8 @@ impl From<PictureError> for Error {
     }
 }
 
-/// Writes a file in one go: into a temporary file of the same folder, then renamed, so that a
-/// reader sees the whole file or the old one.
+/// Writes a file atomically, through a temporary file in the same folder that is then renamed.
+/// Readers find either the whole file or the old one.
 ///
 /// # Errors
 /// [`PictureError::Write`] with the path.

@@ -1,7 +1,6 @@
-//! The fonts of figures and pictures: embedded, so that they are the same on every machine.
+//! The embedded fonts of figures and pictures, which look the same on every machine.
 //!
-//! An SVG names a list of families as wide as the embedded one or a little narrower: with any of
-//! them the words fit.
+//! An SVG lists font families no wider than the embedded one, so that text fits in any of them.
 
 use std::sync::LazyLock;
 use tiny_skia::{Path, PathBuilder};
@@ -11,10 +10,9 @@ use ttf_parser::{Face, GlyphId, OutlineBuilder};
 const REGULAR: &[u8] = include_bytes!("assets/DejaVuSansCondensed-subset.ttf");
 const BOLD: &[u8] = include_bytes!("assets/DejaVuSansCondensed-Bold-subset.ttf");
 
-/// What the figures' SVG asks for.
+/// The font families that the SVG of figures lists.
 pub const FAMILIES: &str = "'DejaVu Sans Condensed', Arial, Helvetica, 'Liberation Sans', sans-serif";
 
-/// An embedded font.
 fn font(bold: bool) -> &'static Face<'static> {
     static FONTS: LazyLock<[Face; 2]> = LazyLock::new(|| {
         [REGULAR, BOLD]
@@ -23,25 +21,25 @@ fn font(bold: bool) -> &'static Face<'static> {
     &FONTS[usize::from(bold)]
 }
 
-/// The letter of a font; what the font lacks is its empty box.
+/// Returns the glyph of a letter, or the font's empty box if it lacks the letter.
 fn glyph(font: &Face, letter: char) -> GlyphId {
     font.glyph_index(letter).unwrap_or_default()
 }
 
-/// Width of a letter, font units.
+/// Returns the width of a glyph in font units.
 fn advance(font: &Face, glyph: GlyphId) -> u16 {
     font.glyph_hor_advance(glyph).unwrap_or(0)
 }
 
-/// Width of a text in points at a font size, unkerned: there is room for it in any of the families.
+/// Returns the width of an unkerned text, points, at a font size; every family of figures fits it.
 pub fn width(text: &str, size: f64, bold: bool) -> f64 {
     let font = font(bold);
     let units: u64 = text.chars().map(|letter| u64::from(advance(font, glyph(font, letter)))).sum();
-    // Of sizes font engines know 64ths.
+    // Font engines round sizes to 64ths.
     (64.0 * size).floor() / 64.0 * units as f64 / f64::from(font.units_per_em())
 }
 
-/// The kerned outlines of a text that begins at the origin, y down, none of blanks; and its width.
+/// Returns the kerned outlines of a text from the origin, y down, and its width. Blanks have none.
 pub fn letters(text: &str, size: f64, bold: bool) -> (Option<Path>, f32) {
     let font = font(bold);
     let scale = size as f32 / f32::from(font.units_per_em());
@@ -50,7 +48,7 @@ pub fn letters(text: &str, size: f64, bold: bool) -> (Option<Path>, f32) {
     for letter in text.chars() {
         let glyph = glyph(font, letter);
         outlines.x += scale * f32::from(before.map_or(0, |before| kerning(font, before, glyph)));
-        // Blanks have none.
+        // Blanks have no outline.
         let _ = font.outline_glyph(glyph, &mut outlines);
         outlines.x += scale * f32::from(advance(font, glyph));
         before = Some(glyph);
@@ -58,8 +56,8 @@ pub fn letters(text: &str, size: f64, bold: bool) -> (Option<Path>, f32) {
     (outlines.path.finish(), outlines.x)
 }
 
-/// How much farther from another letter a letter stands than their widths say, font units. The
-/// embedded fonts have one table of pairs of classes.
+/// Returns the kerning of two letters, font units. The embedded fonts have one table of class
+/// pairs.
 fn kerning(font: &Face, before: GlyphId, glyph: GlyphId) -> i16 {
     let table = font.tables().gpos.and_then(|gpos| gpos.lookups.get(0)?.subtables.get(0));
     match table {
@@ -72,7 +70,7 @@ fn kerning(font: &Face, before: GlyphId, glyph: GlyphId) -> i16 {
     }
 }
 
-/// Takes a letter's outline, in font units and with y up, to its place in a text.
+/// Moves a letter's outline, in font units and with y up, to its position in a text.
 struct Outlines {
     path: PathBuilder,
     scale: f32,
@@ -111,12 +109,12 @@ impl OutlineBuilder for Outlines {
     }
 }
 
-/// A text no wider than `most` points: cut, with an ellipsis, if it has to be.
+/// Returns a text no wider than `most` points, cut with an ellipsis if necessary.
 pub fn fitted(text: &str, size: f64, bold: bool, most: f64) -> String {
     if width(text, size, bold) <= most {
         return text.to_string();
     }
-    // Letter by letter up to the edge: a name in a file may have millions.
+    // Measures only up to the edge: a name in a file may have millions of letters.
     let left = most - width("…", size, bold);
     let mut wide = 0.0;
     let begin = text.chars().take_while(|letter| {
@@ -126,8 +124,8 @@ pub fn fitted(text: &str, size: f64, bold: bool, most: f64) -> String {
     begin.collect::<String>().trim_end().to_string() + "…"
 }
 
-/// A text in at most `count` lines no wider than `most` points, broken at blanks; what is too long
-/// even so is cut.
+/// Breaks a text at blanks into at most `count` lines, none wider than `most` points. Text that
+/// does not fit even so is cut.
 pub fn lines(text: &str, size: f64, bold: bool, most: f64, count: usize) -> Vec<String> {
     let mut lines = Vec::new();
     let mut rest = text;
@@ -172,7 +170,7 @@ mod tests {
         let cut = fitted("a very long name of a very long run", 8.0, false, 60.0);
         assert!(cut.ends_with('…') && width(&cut, 8.0, false) <= 60.0 && cut.len() > 8, "{cut}");
         assert_eq!(fitted("x", 8.0, false, 0.0), "…");
-        // However long it is, at once.
+        // Cutting takes no time, however long the text is.
         let endless = fitted(&"name ".repeat(1_000_000), 8.0, false, 60.0);
         assert!(
             endless.starts_with("name name") && endless.ends_with('…') && endless.len() < 40,
@@ -190,7 +188,7 @@ mod tests {
         assert!(three.iter().all(|line| width(line, 8.0, false) <= 60.0), "{three:?}");
         assert_eq!(broken(60.0, 9), three);
         assert!(broken(60.0, 2)[1].ends_with('…') && broken(60.0, 1)[0].ends_with('…'));
-        // A word that is too long by itself is cut.
+        // A single word that is too long is cut.
         assert_eq!(lines("morphological", 8.0, false, 30.0, 3).len(), 1);
         assert_eq!(lines("", 8.0, false, 30.0, 3), [""]);
     }

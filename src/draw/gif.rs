@@ -1,4 +1,4 @@
-//! Animated GIFs of recordings: one palette, and per frame only what changed.
+//! Animated GIFs of recordings, with one palette; each frame stores only the pixels that changed.
 
 use crate::base::threads::in_pool;
 use crate::draw::colour::Colour;
@@ -14,21 +14,19 @@ use ::gif::{DisposalMethod, Encoder, Frame, Repeat};
 use rayon::prelude::*;
 use std::path::Path;
 
-/// How an animation is made.
+/// Options of an animation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GifOptions {
-    /// Width in pixels ([`stage::WIDTHS`](crate::draw::stage::WIDTHS)); the height follows from the
-    /// body.
+    /// Width in pixels ([`stage::WIDTHS`](crate::draw::stage::WIDTHS)); the body gives the height.
     pub width: u32,
-    /// Frames per second, at most 50 (GIFs count in hundredths of a second, and viewers slow down
-    /// faster ones).
+    /// Frames per second, at most 50 (GIFs count hundredths of a second; viewers slow faster ones).
     pub fps: f64,
-    /// Control steps from one frame to the next, at least 1. There are 50 control steps in a second
-    /// of the robot's time: 1 at 50 frames per second is real time.
+    /// The control steps from one frame to the next, at least 1. A second of the robot's time has
+    /// 50 control steps, so 1 at 50 frames per second is real time.
     pub every: usize,
-    /// How the world is drawn.
+    /// The look of the world.
     pub look: Look,
-    /// Seconds for which the last frame of a phase is held.
+    /// The seconds for which the last frame of each phase stays.
     pub hold: f64,
 }
 
@@ -38,24 +36,23 @@ impl Default for GifOptions {
     }
 }
 
-/// Frames whose colours make the palette.
+/// The number of frames sampled for the palette.
 const SAMPLES: usize = 24;
-/// Shades of a material in the palette: few enough that voxels do not change colour with every
-/// frame.
+/// Shades of a material in the palette: few enough that voxels keep their colour between frames.
 const SHADES: u32 = 9;
-/// Frames rendered at a time.
+/// The number of frames rendered at a time.
 const BATCH: usize = 32;
 
-/// Writes a recording as an animated GIF that repeats for ever.
+/// Writes a recording as an animated GIF that loops for ever.
 ///
 /// # Errors
-/// [`PictureError`] if the recording cannot be drawn, the width is not possible or the file cannot
-/// be written.
+/// Returns a [`PictureError`] if the recording cannot be drawn, the width is not possible or the
+/// file cannot be written.
 pub fn write(path: &Path, recording: &Recording, options: &GifOptions) -> Result<(), PictureError> {
     write_whole(path, &encode(recording, options)?)
 }
 
-/// The frames of a recording that are shown: every `every`-th of each phase, and each phase's last.
+/// Returns the frames to draw: every `every`-th of each phase, and each phase's last.
 pub fn shown(walk: &Walk, every: usize) -> Vec<usize> {
     let mut frames = Vec::new();
     for phase in 0..walk.recording().phases.len() {
@@ -67,10 +64,10 @@ pub fn shown(walk: &Walk, every: usize) -> Vec<usize> {
     frames
 }
 
-/// The bytes of the GIF.
+/// Returns the bytes of the animated GIF.
 ///
 /// # Errors
-/// As [`write()`], but for the file.
+/// Returns the errors of [`write()`], except those of the file.
 pub fn encode(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, PictureError> {
     in_pool(|| encoded(recording, options))?
 }
@@ -81,7 +78,7 @@ fn encoded(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, Pictu
     let frames = shown(&walk, options.every);
     let palette = palette(&walk, &stage, &frames)?;
     let unchanged = palette.colours().len() as u8;
-    // The last entry is never seen: it stands for "as before".
+    // The last entry is never drawn: its index means "unchanged".
     let colours = [palette.colours(), &[[0, 0, 0]]].concat().concat();
     let failed = |e: ::gif::EncodingError| PictureError::Encode(e.to_string());
     let (width, height) = (stage.width as u16, stage.height as u16);
@@ -89,14 +86,14 @@ fn encoded(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, Pictu
     encoder.set_repeat(Repeat::Infinite).map_err(|e| PictureError::Encode(e.to_string()))?;
     let centiseconds =
         |seconds: f64| if seconds > 0.0 { (100.0 * seconds).round().min(6e3) as u16 } else { 0 };
-    // Frames last whole hundredths of a second, together as long as they should.
+    // Delays are whole hundredths of a second, rounded so that their sum stays correct.
     let until = |frame: usize| f64::from(centiseconds(1.0)) * frame as f64 / options.fps.max(0.1);
     let delay = |frame: usize| ((until(frame + 1).round() - until(frame).round()).min(6e3) as u16).max(2);
     let hold = centiseconds(options.hold);
     let mut number = 0;
     let mut before: Vec<u8> = Vec::new();
     for batch in frames.chunks(BATCH) {
-        // In parallel, but in order; a batch's frames are all the memory it needs.
+        // In parallel but in order, and only one batch in memory.
         let mut images = vec![before];
         let batch_images: Vec<_> = batch.par_iter().map(|f| indexed(&walk, &stage, &palette, *f)).collect();
         for image in batch_images {
@@ -115,10 +112,10 @@ fn encoded(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, Pictu
     encoder.into_inner().map_err(|e| PictureError::Encode(e.to_string()))
 }
 
-/// A single frame as a GIF, which has a third of the bytes of a PNG.
+/// Returns a single frame as a GIF, which is a third of the size of a PNG.
 ///
 /// # Errors
-/// As [`encode`].
+/// Returns the errors of [`encode`].
 pub fn still(walk: &Walk, frame: usize, width: u32) -> Result<Vec<u8>, PictureError> {
     let stage = Stage::new(walk, width)?.crisp();
     let palette = palette(walk, &stage, &[frame])?;
@@ -153,8 +150,8 @@ fn indexed(walk: &Walk, stage: &Stage, palette: &Palette, frame: usize) -> Resul
     Ok(picture.data().chunks_exact(4).map(|p| palette.index([p[0], p[1], p[2]])).collect())
 }
 
-/// What changed from one image to the next as a compressed frame: the smallest rectangle, in it
-/// `unchanged` where nothing did; or all of the rectangle, if that is shorter.
+/// Compresses the difference of two images: the smallest rectangle that contains every change.
+/// Pixels without a change are `unchanged`, unless the plain rectangle is shorter.
 fn difference(before: &[u8], now: &[u8], width: u16, height: u16, unchanged: u8) -> Frame<'static> {
     let row = usize::from(width);
     let is_changed = |i: usize| before.get(i) != Some(&now[i]);
@@ -162,7 +159,7 @@ fn difference(before: &[u8], now: &[u8], width: u16, height: u16, unchanged: u8)
     let changed_column = |c: &usize| (0..usize::from(height)).any(|r| is_changed(r * row + c));
     let rows = 0..usize::from(height);
     let columns = 0..row;
-    // Nothing changed: one pixel, unchanged.
+    // If nothing changed, a single unchanged pixel remains.
     let top = rows.clone().find(changed_row).unwrap_or(0);
     let bottom = rows.rev().find(changed_row).unwrap_or(0);
     let left = columns.clone().find(changed_column).unwrap_or(0);
@@ -192,7 +189,7 @@ mod tests {
     use super::*;
     use crate::draw::simulated;
 
-    /// Every frame of a GIF as a viewer shows it (RGB bytes), with its delay.
+    /// Decodes every frame of a GIF as a viewer displays it (RGB bytes), with its delay.
     fn decode(bytes: &[u8]) -> (u16, u16, Repeat, Vec<(Vec<u8>, u16)>) {
         let mut decoder = ::gif::DecodeOptions::new().read_info(bytes).unwrap();
         let (width, height) = (decoder.width(), decoder.height());

@@ -1,8 +1,8 @@
 //! One self-contained HTML page that plays a recording: no network, works from `file://`.
 //!
 //! Positions are embedded as 16-bit numbers, in steps of 1/200 voxel length from an origin per
-//! frame (near the centre of mass, in 64-bit floats): exact within 0.0025 voxel lengths however far
-//! the robot walks. Small pages are coarser and keep some moments of the walk only.
+//! frame (near the centre of mass, as 64-bit floats). They are accurate to 0.0025 voxel lengths
+//! however far the robot walks. Small pages are coarser and keep only some moments of the walk.
 
 use crate::body::{Body, Material};
 use crate::draw::colour::{TONE_AREAS, mark, tones};
@@ -18,26 +18,24 @@ use std::io::Write;
 use std::path::Path;
 
 const TEMPLATE: &str = include_str!("replay.html");
-/// And its script.
 const SCRIPT: &str = concat!(include_str!("drawing.js"), include_str!("replay.js"));
-/// Steps of a position per voxel length.
+/// The steps of a position per voxel length.
 pub(crate) const STEPS: f64 = 200.0;
-/// The same in small pages, which show a voxel some twenty pixels wide.
+/// The steps per voxel length in small pages, whose voxels are some twenty pixels wide.
 const COARSE_STEPS: f64 = 50.0;
-/// Most coordinates in a small page, about: ten moments a cycle of a body of 14 × 14 voxels under
-/// two images.
+/// The approximate number of coordinates in a small page: ten moments a cycle for a body of 14 × 14
+/// voxels under two images.
 const SMALL: usize = 100_000;
-/// The number for a position that is not finite or more than 163 voxel lengths from the frame's
-/// origin.
+/// Code of a position that is not finite or over 163 voxel lengths from the frame's origin.
 const NOWHERE: i16 = i16::MIN;
-/// Most bytes of positions in a page (a third more in base64); longer recordings show every second
-/// frame, third …
+/// The maximum size of positions in a page, bytes (a third more in base64). Longer recordings keep
+/// every second frame, third …
 const MOST_BYTES: usize = 5_500_000;
 
-/// Writes the page. `title` and the `metadata` (shown as a table, in order) may be any text.
+/// Writes the page. The `title` and `metadata` (a table, in order) may contain any text.
 ///
 /// # Errors
-/// [`PictureError`] if the recording cannot be drawn or the file cannot be written.
+/// Returns a [`PictureError`] if the recording cannot be drawn or the file cannot be written.
 pub fn write(
     path: &Path,
     recording: &Recording,
@@ -47,7 +45,7 @@ pub fn write(
     write_whole(path, page(recording, title, metadata)?.as_bytes())
 }
 
-/// The page as text.
+/// Returns the page as text.
 ///
 /// # Errors
 /// [`PictureError::Recording`] if the recording cannot be drawn.
@@ -58,15 +56,15 @@ pub fn page(
 ) -> Result<String, PictureError> {
     let walk = Walk::new(recording)?;
     let rollout = rollout(&walk, MOST_BYTES).to_string();
-    // In a script element only "<" could end it or open another.
+    // In a script element, only "<" can end it or open another.
     Ok(filled(recording, title, metadata, &rollout.replace('<', "\\u003c")))
 }
 
-/// The page as text, small enough for a notebook that shows many robots: with some moments of the
-/// walk, between which its script moves points on straight lines.
+/// Returns a page as text, small enough for a notebook with many robots. It keeps some moments of
+/// the walk; its script interpolates points linearly between them.
 ///
 /// # Errors
-/// [`PictureError`] if the recording cannot be drawn.
+/// Returns a [`PictureError`] if the recording cannot be drawn.
 pub fn small_page(
     recording: &Recording,
     title: &str,
@@ -80,7 +78,7 @@ pub fn small_page(
     Ok(filled(recording, title, metadata, &pack(&rollout)?))
 }
 
-/// The template with a recording in it: as JSON, or packed.
+/// Fills the template with a recording, as JSON or packed.
 fn filled(recording: &Recording, title: &str, metadata: &[(String, String)], rollout: &str) -> String {
     let rows = metadata.iter().map(|(key, value)| {
         format!("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n", escape(key), escape(value))
@@ -103,7 +101,7 @@ fn filled(recording: &Recording, title: &str, metadata: &[(String, String)], rol
     )
 }
 
-/// A page in which `rollout` stands where its recording belongs.
+/// Returns a page whose recording is `rollout`.
 pub(super) fn player(rollout: &str) -> String {
     fill(
         TEMPLATE,
@@ -118,18 +116,18 @@ pub(super) fn player(rollout: &str) -> String {
     )
 }
 
-/// A recording for [`player`], packed: gzip in base64. `most`: its largest size \[bytes\], about.
+/// Packs a recording for [`player`]: gzip in base64, of about `most` bytes at the largest.
 ///
 /// # Errors
-/// [`PictureError::Encode`] if it cannot be packed.
+/// Returns [`PictureError::Encode`] if packing fails.
 pub(super) fn packed(walk: &Walk, most: usize) -> Result<String, PictureError> {
     pack(&rollout(walk, most))
 }
 
-/// A value as text: gzip in base64. The same bytes every time: the header has no time in it.
+/// Packs a value as text: gzip in base64. The bytes are reproducible: the header holds no time.
 ///
 /// # Errors
-/// [`PictureError::Encode`] if it cannot be packed.
+/// Returns [`PictureError::Encode`] if packing fails.
 pub(super) fn pack(value: &Value) -> Result<String, PictureError> {
     packed_bytes(value.to_string().as_bytes())
 }
@@ -141,8 +139,8 @@ fn packed_bytes(bytes: &[u8]) -> Result<String, PictureError> {
     Ok(BASE64.encode(packer.finish().map_err(failed)?))
 }
 
-/// Positions of moments as their differences to the moment before, coordinate by coordinate: all
-/// low bytes, then all high ones, which pack best.
+/// Returns the differences of positions from the previous moment, coordinate by coordinate. All low
+/// bytes come before all high bytes, which compresses best.
 fn differences(positions: &[i16], width: usize) -> Vec<u8> {
     let of_coordinate = |coordinate: usize| {
         let own = positions.iter().skip(coordinate).step_by(width.max(1));
@@ -152,13 +150,13 @@ fn differences(positions: &[i16], width: usize) -> Vec<u8> {
     [0, 1].into_iter().flat_map(|byte| words.iter().map(move |word| word[byte])).collect()
 }
 
-/// Points of every frame.
+/// Returns the number of points that every frame has.
 fn points(recording: &Recording) -> usize {
     recording.frames.iter().map(|f| f.points.len()).min().unwrap_or(0)
 }
 
-/// The recording as the page's script reads it; `most`: bytes of positions, of which there are
-/// fewer for longer rollouts.
+/// Returns the recording in the format of the page's script. Longer rollouts keep fewer frames, so
+/// that positions take at most `most` bytes.
 fn rollout(walk: &Walk, most: usize) -> Value {
     let every = (walk.len() * points(walk.recording()) * 4).div_ceil(most.max(1)).max(1);
     let (mut rollout, positions) = moments(walk, every, STEPS);
@@ -166,8 +164,8 @@ fn rollout(walk: &Walk, most: usize) -> Value {
     rollout
 }
 
-/// Every so many frames of each phase and its last one: all but the positions, and these, in steps
-/// of a voxel length's `unit`th from the origin of their frame.
+/// Samples every `every`-th frame of each phase and its last. Returns everything but the positions,
+/// and the positions in steps of 1/`unit` voxel length from the origin of their frame.
 fn moments(walk: &Walk, every: usize, unit: f64) -> (Value, Vec<i16>) {
     let recording = walk.recording();
     let points = points(recording);
@@ -213,7 +211,7 @@ fn moments(walk: &Walk, every: usize, unit: f64) -> (Value, Vec<i16>) {
     (rollout, positions)
 }
 
-/// What the pages' scripts have to know of materials to draw them.
+/// Describes the materials for the pages' scripts.
 pub(crate) fn materials() -> Value {
     let material = |m: Material| {
         let (name, tones, mark) = (m.name(), tones(m), mark(m));
@@ -222,7 +220,7 @@ pub(crate) fn materials() -> Value {
     json!({ "areas": TONE_AREAS, "list": Material::ALL.map(material) })
 }
 
-/// Voxels as the pages' scripts draw them: material, corners, row and column.
+/// Describes voxels for the pages' scripts: material, corners, row and column.
 pub(crate) fn corners(body: &Body, voxels: &[VoxelCorners]) -> Vec<Value> {
     let corners = |v: &VoxelCorners| {
         let material = body.at(v.row as isize, v.column as isize);
@@ -244,12 +242,12 @@ fn in_steps(point: [f64; 2], origin: [f64; 2], unit: f64) -> [i16; 2] {
     if steps.iter().all(|s| s.abs() < 32767.0) { steps.map(|s| s as i16) } else { [NOWHERE; 2] }
 }
 
-/// JSON has no infinities: `null` for them.
+/// Returns `None` for infinite values and NaN, which JSON lacks.
 fn number(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
-/// Text as it stands in HTML, in elements and in quoted attributes.
+/// Escapes text for HTML elements and quoted attributes.
 pub(super) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for letter in text.chars() {
@@ -265,7 +263,7 @@ pub(super) fn escape(text: &str) -> String {
     out
 }
 
-/// The template with its `{{name}}`s replaced, in one pass: what is put in is not looked at again.
+/// Replaces each `{{name}}` of a template in one pass; inserted values are not expanded again.
 pub(super) fn fill(template: &str, values: &[(&str, &str)]) -> String {
     let mut out = String::new();
     let mut rest = template;
@@ -289,7 +287,7 @@ mod tests {
         serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()
     }
 
-    /// Positions by shown frame, as the script decodes them.
+    /// Decodes the positions of every stored frame as the script does.
     fn positions(rollout: &Value) -> Vec<Vec<Option<[f64; 2]>>> {
         let data = |key: &str| BASE64.decode(rollout[key].as_str().unwrap()).unwrap();
         let origins: Vec<f64> =

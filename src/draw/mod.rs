@@ -1,10 +1,9 @@
-//! Pictures: recordings of rollouts become images, animations and pages here.
+//! Images, animations and pages made from recordings of rollouts.
 //!
-//! A [`Walk`] is a checked [`Recording`](crate::task::recording::Recording); a [`Stage`] decides
-//! what part of the world a picture shows; `scene` and `panel` make drawing primitives of one
-//! frame; `raster` paints them. On top of these stand the animated GIF and the self-contained HTML
-//! page. Figures for print are vectors and stand apart, in [`plot`].
-//! `serve` is a page of its own, over HTTP.
+//! A [`Walk`] is a validated [`Recording`](crate::task::recording::Recording); a [`Stage`] decides
+//! which part of the world a picture shows. `scene` and `panel` turn one frame into drawing
+//! primitives, and `raster` paints them. The animated GIF and the self-contained HTML page build on
+//! these. Figures for print are vectors, in [`plot`]; `serve` has its own page, over HTTP.
 
 pub mod colour;
 pub mod error;
@@ -24,8 +23,8 @@ pub mod walk;
 pub use stage::Stage;
 pub use walk::Walk;
 
-/// For tests: the simulation of a body (text form) that is shown `phases` images, dark and bright
-/// ones by turns, each for `steps` control steps.
+/// Simulates a body (text form) for tests, under `phases` images, alternately dark and bright, for
+/// `steps` control steps each.
 #[cfg(test)]
 pub(crate) fn simulated(
     body: &str,

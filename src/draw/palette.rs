@@ -1,23 +1,23 @@
-//! One palette for a whole animation: the frequent colours of some of its frames.
+//! A palette for a whole animation: the most frequent colours of some of its frames.
 
 use std::collections::BTreeMap;
 
-/// Most colours of a palette; one index of 256 is left for "unchanged".
+/// The maximum number of colours in a palette; one index of 256 is reserved for "unchanged".
 const COLOURS: usize = 255;
-/// Colours nearer to each other than this (Euclidean, of 255 per channel) share an index.
+/// Colours closer than this (Euclidean, 255 per channel) share an index.
 const NEAR: i32 = 18;
 
-/// Up to 255 colours, and the nearest of them for any colour.
+/// Up to 255 colours, with the nearest one to any colour.
 #[derive(Clone, Debug)]
 pub struct Palette {
     colours: Vec<[u8; 3]>,
-    /// Index of the nearest colour by the upper six bits of red, green, blue.
+    /// The index of the nearest colour, by the upper six bits of red, green and blue.
     nearest: Vec<u8>,
 }
 
 impl Palette {
-    /// A palette: the `fixed` colours, then the most frequent of the samples (RGBA bytes) that are
-    /// not near one already taken.
+    /// Creates a palette from the `fixed` colours and then the most frequent colours of the samples
+    /// (RGBA bytes), except those near a colour already in it.
     pub fn new<'a>(fixed: &[[u8; 3]], samples: impl IntoIterator<Item = &'a [u8]>) -> Self {
         let mut counts: BTreeMap<[u8; 3], u32> = BTreeMap::new();
         for sample in samples {
@@ -41,13 +41,13 @@ impl Palette {
         Palette { nearest: nearest.collect(), colours }
     }
 
-    /// Index of the colour nearest to a pixel's red, green and blue.
+    /// Returns the index of the colour nearest to a pixel's red, green and blue.
     pub fn index(&self, [r, g, b]: [u8; 3]) -> u8 {
         let bin = usize::from(r >> 2) << 12 | usize::from(g >> 2) << 6 | usize::from(b >> 2);
         self.nearest[bin]
     }
 
-    /// The colours in the order of their indices.
+    /// Returns the colours in the order of their indices.
     pub fn colours(&self) -> &[[u8; 3]] {
         &self.colours
     }

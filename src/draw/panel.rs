@@ -1,5 +1,4 @@
-//! What stands around the world in a raster picture: stimulus, read-outs, legend, numbers on the
-//! ruler. In pixels, y down.
+//! The raster picture around the world: stimulus, read-outs, legend, ruler numbers; pixels, y down.
 
 use crate::base::number;
 use crate::body::{Body, Material};
@@ -11,23 +10,23 @@ use crate::draw::{colour, fonts};
 use crate::task::judge;
 use crate::task::recording::Seen;
 
-/// Side of the stimulus picture at zoom 1, pixels.
+/// The side of the stimulus picture at zoom 1, pixels.
 const STIMULUS: f64 = 84.0;
-/// Width of the legend at zoom 1, pixels.
+/// The width of the legend at zoom 1, pixels.
 const LEGEND: f64 = 116.0;
-/// Distance from the picture's edges at zoom 1, pixels.
+/// The margin at the picture's edges at zoom 1, pixels.
 const MARGIN: f64 = 10.0;
-/// Distance of the words from what stands left and right of them at zoom 1, pixels.
+/// The gap between the words and their neighbours left and right at zoom 1, pixels.
 const GAP: f64 = 12.0;
 
-/// Sizes of letters at zoom 1, pixels.
+/// Font sizes at zoom 1, pixels.
 const LARGE: f64 = 15.0;
 const SMALL: f64 = 11.0;
-/// What a displacement is measured in, and its distance from the number at zoom 1, pixels.
+/// The unit of a displacement, and its distance from the number at zoom 1, pixels.
 const UNIT: &str = "voxel lengths";
 const BEFORE_UNIT: f64 = 5.0;
 
-/// Everything around the world at a frame.
+/// Draws everything around the world at a frame.
 pub fn panel(walk: &Walk, frame: usize, stage: &Stage) -> Vec<Primitive> {
     let z = stage.zoom;
     let mut out =
@@ -44,8 +43,8 @@ pub fn panel(walk: &Walk, frame: usize, stage: &Stage) -> Vec<Primitive> {
     out
 }
 
-/// Width at zoom 1, pixels, from which on the legend has room beside the words of a walk. The names
-/// of image and robot do not count: they may be of any length, and are cut.
+/// Returns the width at zoom 1, pixels, from which the legend fits beside the words of a walk. The
+/// names of image and robot do not count: they may have any length, and are cut.
 pub fn least_width(walk: &Walk) -> f64 {
     let recording = walk.recording();
     let large = |text: &str| fonts::width(text, LARGE, true);
@@ -64,23 +63,23 @@ pub fn least_width(walk: &Walk) -> f64 {
     MARGIN + STIMULUS + GAP + words + GAP + LEGEND + MARGIN
 }
 
-/// Words on a moment of a walk: what every view says.
+/// The words about a moment of a walk that every view shows.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Readout {
-    /// What the robot sees.
+    /// The label of the current image.
     pub label: String,
-    /// Control steps of the phase done and all of them, and cycles done.
+    /// The control steps completed in the phase, their total, and the cycles completed.
     pub time: String,
-    /// Signed distance in the phase, with the direction as an arrow.
+    /// The signed distance in the phase, with the direction as an arrow.
     pub displacement: String,
-    /// What that says ([`judge::verdict`]).
+    /// The conclusion from the distance ([`judge::verdict`]).
     pub verdict: String,
 }
 
-/// The words for a frame.
+/// Returns the words about a frame.
 pub fn readout(walk: &Walk, frame: usize) -> Readout {
     let frames = walk.phase_frames(walk.phase_index(frame));
-    // A phase that goes on into the next ends with that one's first frame.
+    // A phase that continues into the next ends with the first frame of that phase.
     let goes_on = frames.end < walk.len() && !walk.is_fresh(walk.phase_index(frame) + 1);
     let last = if goes_on { frames.end } else { frames.end.saturating_sub(1) };
     let step = frame.saturating_sub(frames.start);
@@ -102,15 +101,14 @@ pub fn readout(walk: &Walk, frame: usize) -> Readout {
     }
 }
 
-/// A distance with its sign and two decimals; shorter when huge.
+/// Formats a distance with its sign and two decimals, or shorter if it is huge.
 pub fn signed(distance: f64) -> String {
     let is_short = distance.abs() < 1e5;
     let text = if is_short { number::signed(distance, 2) } else { format!("{distance:+.1e}") };
     text.replace('-', "−")
 }
 
-/// The picture as the sensors see it, the sensor voxels framed in their colour. Returns its width
-/// and height.
+/// Draws the stimulus, its sensor voxels framed in their colour. Returns its width and height.
 fn stimulus(walk: &Walk, frame: usize, [x, y]: [f64; 2], z: f64, out: &mut Vec<Primitive>) -> [f64; 2] {
     let image = &walk.phase(frame).seen.stimulus;
     let longest = image.height().max(image.width()) as f64;
@@ -126,7 +124,7 @@ fn stimulus(walk: &Walk, frame: usize, [x, y]: [f64; 2], z: f64, out: &mut Vec<P
         let at = |dr: isize, dc: isize| body.at(row as isize + dr, column as isize + dc);
         let material = at(0, 0);
         if material.is_sensor() {
-            // The outline of the region of one kind of sensor, inside its cells.
+            // Outlines the region of one kind of sensor, inside its cells.
             let line = (z * 1.0).min(cell / 3.0).max(1.0);
             let colour = sensor_line(material);
             let mut side = |a, b| out.push(Primitive::rectangle(a, b, colour));
@@ -147,12 +145,12 @@ fn stimulus(walk: &Walk, frame: usize, [x, y]: [f64; 2], z: f64, out: &mut Vec<P
     size
 }
 
-/// Brighter than the voxel: seen on black and on white.
+/// Returns a colour brighter than the voxel, visible on black and on white.
 fn sensor_line(material: Material) -> Colour {
     if material == Material::SensorShrink { Colour::new(240, 62, 82) } else { Colour::new(38, 186, 120) }
 }
 
-/// The words, none of them wider than there is `room` \[pixels at zoom 1\].
+/// Draws the words, each line at most `room` wide \[pixels at zoom 1\].
 fn readouts(walk: &Walk, frame: usize, [x, y]: [f64; 2], room: f64, z: f64, out: &mut Vec<Primitive>) {
     let words = readout(walk, frame);
     let recording = walk.recording();
@@ -175,7 +173,7 @@ fn readouts(walk: &Walk, frame: usize, [x, y]: [f64; 2], room: f64, z: f64, out:
     line([0.0, 83.0], &note, SMALL, false, colour);
 }
 
-/// The materials that the body has.
+/// Returns the materials of a body.
 pub fn present(body: &Body) -> impl Iterator<Item = Material> {
     Material::ALL.into_iter().filter(|m| !m.is_empty() && body.voxels().cells().contains(m))
 }
@@ -219,7 +217,7 @@ fn numbers(walk: &Walk, frame: usize, stage: &Stage, out: &mut Vec<Primitive>) {
     for mark in ruler(&window, zero, step) {
         let at = stage.to_pixels(frame, [zero + mark, 0.0]);
         let text = if mark == 0.0 { "0".into() } else { format!("{mark:+}").replace('-', "−") };
-        // The sign hangs over: the digits stand under their tick.
+        // The sign hangs over, so that the digits are centred under their tick.
         let size = SMALL * z;
         let digits = fonts::width(text.trim_start_matches(['+', '−']), size, false);
         let left = at[0] - digits / 2.0 - (fonts::width(&text, size, false) - digits);

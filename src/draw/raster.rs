@@ -1,4 +1,4 @@
-//! Primitives → pixels, with tiny-skia; PNG files.
+//! Rendering of primitives to pixels with tiny-skia, and PNG files.
 
 use crate::draw::colour::Colour;
 use crate::draw::error::{PictureError, write_whole};
@@ -9,14 +9,14 @@ use crate::draw::{fonts, panel, scene};
 use std::path::Path;
 use tiny_skia::{FillRule, LineCap, LineJoin, Paint, PathBuilder, Pixmap, Stroke, Transform};
 
-/// Pixels beyond the picture's edges where lines are cut: far enough to be unseen, near enough for
-/// 32-bit floats.
+/// The distance beyond the picture's edges, pixels, at which lines are cut: far enough to be
+/// invisible, near enough for 32-bit floats.
 const BEYOND: f64 = 8192.0;
 
-/// The picture of a frame: opaque RGBA.
+/// Renders the picture of a frame as opaque RGBA.
 ///
 /// # Errors
-/// [`PictureError::Size`] if the stage has no pixels.
+/// Returns [`PictureError::Size`] if the stage has no pixels.
 pub fn picture(walk: &Walk, frame: usize, stage: &Stage) -> Result<Pixmap, PictureError> {
     let (width, height) = (stage.width, stage.height);
     let mut pixmap = Pixmap::new(width, height).ok_or(PictureError::Size { width, height })?;
@@ -27,8 +27,7 @@ pub fn picture(walk: &Walk, frame: usize, stage: &Stage) -> Result<Pixmap, Pictu
     Ok(pixmap)
 }
 
-/// Draws primitives, whose coordinates `to_pixels` turns into pixels (y down); `zoom` multiplies
-/// line widths.
+/// Draws primitives; `to_pixels` maps coordinates to pixels (y down), `zoom` scales line widths.
 pub fn draw(
     pixmap: &mut Pixmap,
     primitives: &[Primitive],
@@ -77,7 +76,7 @@ fn polyline(points: impl Iterator<Item = [f32; 2]>, closed: bool) -> Option<tiny
     builder.finish()
 }
 
-/// What a colour is drawn with.
+/// Returns the paint for a colour.
 pub fn paint(colour: Colour, smooth: bool) -> Paint<'static> {
     let mut paint = Paint { anti_alias: smooth, ..Paint::default() };
     let [r, g, b] = colour.rgb;
@@ -85,10 +84,10 @@ pub fn paint(colour: Colour, smooth: bool) -> Paint<'static> {
     paint
 }
 
-/// Writes a picture as PNG, whole or not at all.
+/// Writes a picture as PNG, atomically.
 ///
 /// # Errors
-/// [`PictureError::Encode`] or [`PictureError::Write`].
+/// Returns [`PictureError::Encode`] or [`PictureError::Write`].
 pub fn write_png(path: &Path, picture: &Pixmap) -> Result<(), PictureError> {
     let bytes = picture.encode_png().map_err(|e| PictureError::Encode(e.to_string()))?;
     write_whole(path, &bytes)
@@ -112,7 +111,7 @@ mod tests {
         let picture = picture(&walk, 10, &stage).unwrap();
         let mut seen = 0;
         for (material, quad) in walk.voxels(10) {
-            // Beside the middle, so that the path of the centre of mass does not cover it.
+            // Off the middle, so that the path of the centre of mass does not cover it.
             let at = [0.7 * quad[0][0] + 0.3 * quad[1][0], 0.7 * quad[0][1] + 0.3 * quad[2][1]];
             let expected = colour::shade(material, crate::draw::walk::area(&quad)).rgb;
             seen += usize::from(pixel(&picture, stage.to_pixels(10, at)) == expected);

@@ -1,5 +1,5 @@
-//! One frame as drawing primitives in world coordinates (voxel lengths, y up): what all raster
-//! pictures are made of.
+//! One frame as drawing primitives in world coordinates (voxel lengths, y up), from which all
+//! raster pictures are made.
 
 use crate::draw::colour;
 use crate::draw::colour::Colour;
@@ -7,13 +7,13 @@ use crate::draw::walk::{Walk, area};
 use std::fmt;
 use std::str::FromStr;
 
-/// How the world is drawn.
+/// The look of the world.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Look {
-    /// A ruler on the ground.
+    /// With a ruler on the ground.
     #[default]
     Plain,
-    /// As in the paper's videos: the world's grid, and the voxels that the ground is made of.
+    /// Like the paper's videos: with the world's grid and the voxels of the ground.
     Paper,
 }
 
@@ -34,57 +34,57 @@ impl FromStr for Look {
     }
 }
 
-/// Something to draw. Coordinates are the world's (voxel lengths, y up) or pixels (y down), as the
-/// maker says.
+/// Something to draw. Coordinates are in the world (voxel lengths, y up) or in pixels (y down),
+/// depending on the function that creates it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Primitive {
     /// A filled quadrilateral.
     Quad {
-        /// Its corners in order.
+        /// The corners in order.
         corners: [[f64; 2]; 4],
-        /// Its colour.
+        /// The fill colour.
         fill: Colour,
-        /// Whether its edges are smoothed; axis-parallel rectangles on whole pixels need not be.
+        /// True if the edges are smoothed; axis-parallel rectangles on whole pixels do not need it.
         smooth: bool,
     },
     /// A line through points.
     Line {
         /// The points in order.
         points: Vec<[f64; 2]>,
-        /// Its width as a multiple of the picture's zoom (about a pixel in a small picture).
+        /// The width as a multiple of the picture's zoom (about a pixel in a small picture).
         width: f64,
-        /// Its colour.
+        /// The colour of the line.
         colour: Colour,
-        /// Whether its edges are smoothed.
+        /// True if the edges are smoothed.
         smooth: bool,
     },
-    /// Words.
+    /// A line of text.
     Text {
-        /// The words.
+        /// The content.
         text: String,
-        /// Where they begin on their base line.
+        /// The start of the baseline.
         at: [f64; 2],
-        /// Size of the letters, pixels.
+        /// The font size, pixels.
         size: f64,
-        /// Whether they are bold.
+        /// True if the text is bold.
         bold: bool,
-        /// Their colour.
+        /// The colour of the text.
         colour: Colour,
     },
 }
 
-/// Pixels per voxel length from which on materials are marked: smaller marks would be specks.
+/// The pixels per voxel length from which materials are marked: smaller marks would be specks.
 const MARKED: f64 = 5.0;
-/// Least width of a mark in pixels; in small voxels it takes more of their width than elsewhere.
+/// The minimum width of a mark, pixels; it takes a larger share of small voxels.
 const MARK_PIXELS: f64 = 4.0;
 
 impl Primitive {
-    /// A filled axis-parallel rectangle between two opposite corners.
+    /// Creates a filled axis-parallel rectangle between two opposite corners.
     pub fn rectangle(a: [f64; 2], b: [f64; 2], fill: Colour) -> Self {
         Primitive::Quad { corners: [a, [b[0], a[1]], b, [a[0], b[1]]], fill, smooth: false }
     }
 
-    /// A line between two points.
+    /// Creates a line between two points.
     pub fn line(from: [f64; 2], to: [f64; 2], width: f64, colour: Colour) -> Self {
         Primitive::Line { points: vec![from, to], width, colour, smooth: true }
     }
@@ -93,19 +93,19 @@ impl Primitive {
 /// A visible part of the world, voxel lengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
-    /// Its left edge.
+    /// The left edge.
     pub left: f64,
-    /// Its right edge.
+    /// The right edge.
     pub right: f64,
-    /// Its lower edge, below the ground's surface at 0.
+    /// The lower edge, below the ground's surface at 0.
     pub bottom: f64,
-    /// Its upper edge.
+    /// The upper edge.
     pub top: f64,
-    /// Pixels per voxel length: what is too small to see is left out.
+    /// The pixels per voxel length; details too small to see are left out.
     pub scale: f64,
-    /// Whether voxels have hard edges: fewer colours, so that animations stay small.
+    /// True if voxels have hard edges, whose fewer colours keep animations small.
     pub crisp: bool,
-    /// How the world is drawn.
+    /// The look of the world.
     pub look: Look,
 }
 
@@ -119,16 +119,16 @@ impl Window {
     }
 }
 
-/// The whole numbers of voxel lengths from the ruler's zero that lie in the window, at most about
-/// 10⁴ of them; every `step`-th.
+/// Returns the multiples of `step` voxel lengths from the ruler's `zero` that lie in the window, at
+/// most about 10⁴ of them.
 pub fn ruler(window: &Window, zero: f64, step: f64) -> impl Iterator<Item = f64> + use<> {
     let first = ((window.left - zero) / step).ceil();
     let count = ((window.right - zero) / step).floor() - first + 1.0;
     (0..count.clamp(0.0, 1e4) as u32).map(move |k| (first + f64::from(k)) * step)
 }
 
-/// The world at a frame, from back to front: sky, ground with its ruler, start marks, body, path of
-/// the centre of mass. The ruler's zero is the centre of mass at the start of the rollout.
+/// Draws the world at a frame, from back to front: sky, ground with its ruler, start marks, body,
+/// path of the centre of mass. The ruler's zero is the centre of mass at the start of the rollout.
 pub fn world(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
     let mut out = ground(walk, frame, window);
     out.extend(body(walk, frame, window));
@@ -147,14 +147,14 @@ fn ground(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
         grid(window, &mut out);
     }
     for (step, depth, line) in [(1.0, 3.0, 1.0), (10.0, 7.0, 1.5)] {
-        // Ticks closer than four pixels would be a gray band.
+        // Ticks closer than four pixels would merge into a gray band.
         if step * scale >= 4.0 {
             let tick = |at| Primitive::line([at, 0.0], [at, -depth / scale], line, colour::GROUND_LINE);
             out.extend(ruler(window, zero, step).map(|mark| tick(zero + mark)));
         }
     }
     out.push(Primitive::line([left, 0.0], [right, 0.0], 1.5, colour::GROUND_LINE));
-    // Where the rollout and (if it goes on) this phase began: dashes of five pixels, five apart.
+    // Marks the start of the rollout and of a continued phase: dashes of five pixels, five apart.
     let phase = walk.centre(walk.phase(frame).first_frame)[0];
     for x in if phase == zero { vec![zero] } else { vec![zero, phase] } {
         let dash = 5.0 / scale;
@@ -165,11 +165,11 @@ fn ground(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
     out
 }
 
-/// The world's columns and rows, and the ground's voxels, of which only the upper part is seen.
+/// Draws the world's columns and rows, and the visible upper part of the ground's voxels.
 fn grid(window: &Window, out: &mut Vec<Primitive>) {
     let Window { left, right, top, scale, .. } = *window;
     let line = |points| Primitive::Line { points, width: 1.0, colour: colour::GRID, smooth: false };
-    // Closer than five pixels it would be a gray veil: every second line then, every fifth …
+    // Lines closer than five pixels would merge into a gray veil; then every second, every fifth …
     let step = [1.0, 2.0, 5.0, 10.0].into_iter().find(|step| step * scale >= 5.0).unwrap_or(20.0);
     out.extend(ruler(window, 0.0, step).map(|x| line(vec![[x, 0.0], [x, top]])));
     let rows = (top / step).clamp(0.0, 1e3) as u32;
@@ -189,7 +189,7 @@ fn body(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
         Primitive::Quad { corners, fill, smooth }
     };
     let mut out: Vec<Primitive> = voxels().map(quad).collect();
-    // The paper's pictures have none.
+    // The paper's pictures have no marks.
     if window.scale >= MARKED && window.look == Look::Plain {
         out.extend(voxels().flat_map(|(material, corners)| {
             let colour = colour::mark_colour(material, colour::shade(material, area(&corners)));
@@ -234,7 +234,7 @@ fn path(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
     let rollout = walk.rollout(frame).start..=frame;
     let points: Vec<[f64; 2]> = rollout.map(|f| walk.centre(f)).collect();
     let mut out = Vec::new();
-    // Split where the path leaves the window, so that a long walk costs no more than a short one.
+    // Splits the path where it leaves the window: a long walk costs no more than a short one.
     for piece in points.chunk_by(|a, b| window.shows(&[*a, *b])).filter(|piece| piece.len() > 1) {
         let line = |width, colour| Primitive::Line { points: piece.to_vec(), width, colour, smooth: true };
         out.push(line(3.4, colour::PAPER.with_opacity(170)));

@@ -1,4 +1,4 @@
-//! The contact sheet (`morphcog data sheet`): images side by side, to be judged by eye.
+//! The contact sheet (`morphcog data sheet`): images side by side, for inspection by eye.
 
 use crate::base::Grid;
 use crate::base::files::write_atomically;
@@ -8,58 +8,58 @@ use std::io;
 use std::path::{Path, PathBuf};
 use tiny_skia::{IntSize, Pixmap};
 
-/// Pixels of the picture per pixel of a small image, and least side of a large one.
+/// The picture's pixels per pixel of a small image, and the minimum side of a large one.
 const SCALE: usize = 3;
-/// Longest side of an image in the picture, pixels.
+/// The longest side of an image in the picture, pixels.
 const LONGEST: usize = 256;
-/// Pixels of the picture between two images and around them.
+/// The gap between images and around them, pixels.
 const GAP: usize = 4;
-/// Grey of the gaps.
+/// The grey of the gaps.
 const PAPER: u8 = 96;
-/// Longest side of a picture, pixels.
+/// The longest side of a picture, pixels.
 const MAX_SIDE: usize = 16_384;
 
-/// Why there is no contact sheet.
+/// A reason why a contact sheet cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum SheetError {
-    /// An image cannot be had.
+    /// An image is not available.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
-    /// Nothing to show, or too much.
+    /// The sheet would be empty or too large.
     #[error(
         "a sheet of {classes} classes with {samples} images each has no sensible size: expected 1 to {MAX_SIDE} \
          pixels in each direction, found {height} × {width}"
     )]
     Size {
-        /// Number of rows of the sheet.
+        /// The number of rows of the sheet, one per class.
         classes: usize,
-        /// Number of columns.
+        /// The number of columns.
         samples: usize,
-        /// Rows of pixels.
+        /// The height in pixels.
         height: usize,
-        /// Columns of pixels.
+        /// The width in pixels.
         width: usize,
     },
-    /// The picture cannot be made into a PNG.
+    /// The picture cannot be encoded as a PNG.
     #[error("the contact sheet cannot be made into a PNG: {0}")]
     Png(String),
     /// The picture cannot be written.
     #[error("{}: cannot be written: {source}", file.display())]
     Write {
-        /// The file.
+        /// The path of the file.
         file: PathBuf,
-        /// What the system says.
+        /// The error from the operating system.
         source: io::Error,
     },
 }
 
-/// The first `samples` images of every class of a split, one class per row; grey, 0 black. Small
-/// images have three times their size, larger ones twice, once, or so little that their longest
-/// side has 256 pixels.
+/// Draws the first `samples` images of every class of a split, one class per row; grey, 0 is black.
+/// Small images are enlarged three times, larger ones twice or not at all. Even larger ones shrink
+/// until their longest side has 256 pixels.
 ///
 /// # Errors
-/// [`SheetError::Size`] if that is nothing or too large, [`SheetError::Dataset`] if an image cannot
-/// be had.
+/// Returns [`SheetError::Size`] if the sheet would be empty or too large, or
+/// [`SheetError::Dataset`] if an image is not available.
 pub fn contact_sheet(dataset: &Dataset, split: Split, samples: usize) -> Result<Grid<u8>, SheetError> {
     let classes = dataset.classes(split);
     let [rows, columns] = dataset.size(split).map_or([0, 0], shown);
@@ -81,7 +81,7 @@ pub fn contact_sheet(dataset: &Dataset, split: Split, samples: usize) -> Result<
     Ok(sheet)
 }
 
-/// Height and width in the picture of images of this size.
+/// Returns the height and width in the picture of images of this size.
 fn shown([height, width]: [usize; 2]) -> [usize; 2] {
     let longest = height.max(width).max(1);
     [height, width].map(|side| match LONGEST / longest {
@@ -90,10 +90,10 @@ fn shown([height, width]: [usize; 2]) -> [usize; 2] {
     })
 }
 
-/// Writes a grey picture as PNG; the file appears whole or not at all.
+/// Writes a grey picture as PNG, atomically.
 ///
 /// # Errors
-/// [`SheetError::Write`] if the file cannot be written.
+/// Returns [`SheetError::Write`] if the file cannot be written.
 pub fn write_png(file: &Path, picture: &Grid<u8>) -> Result<(), SheetError> {
     let bytes = png(picture)?;
     write_atomically(file, &bytes).map_err(|source| SheetError::Write { file: file.to_path_buf(), source })

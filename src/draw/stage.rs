@@ -1,4 +1,4 @@
-//! [`Stage`]: which part of the world a picture shows, and where on it.
+//! [`Stage`]: the part of the world that a picture shows, and the layout around it.
 
 use crate::draw::error::PictureError;
 use crate::draw::panel::least_width;
@@ -8,34 +8,32 @@ use std::ops::RangeInclusive;
 
 pub use crate::draw::error::WIDTHS;
 
-/// Height of the panel above the world (stimulus, read-outs, legend), in pixels at zoom 1.
+/// The height of the panel above the world (stimulus, read-outs, legend), pixels at zoom 1.
 const PANEL: f64 = 104.0;
-/// Height of the ground under its surface, in pixels at zoom 1.
+/// The height of the ground under its surface, pixels at zoom 1.
 const GROUND: f64 = 24.0;
-/// Sky left and right of the whole walk, voxel lengths.
+/// The sky left and right of the whole walk, voxel lengths.
 const MARGIN: f64 = 2.5;
-/// Largest and smallest size of a voxel in pixels at zoom 1; a walk that needs smaller ones is
-/// followed.
+/// Smallest and largest voxel, pixels at zoom 1. The camera follows walks that need smaller ones.
 const VOXEL: RangeInclusive<f64> = 5.5..=22.0;
-/// Frames before and after over which the camera's path is averaged: a cycle, so that it does not
-/// shake with the body.
+/// The frames before and after over which the camera's path is averaged: a cycle, so that the
+/// camera does not shake with the body.
 const SMOOTHING: usize = 50;
 
 /// The camera and the layout of a picture: the panel on top, the world below it, the ground at the
-/// lower edge. If the whole recording fits, the view is fixed; else the camera follows the centre
-/// of mass smoothly.
+/// lower edge. If the whole recording fits, the view is fixed; otherwise the camera follows the
+/// centre of mass smoothly.
 #[derive(Clone, Debug)]
 pub struct Stage {
-    /// Width of the picture, pixels.
+    /// The width of the picture, pixels.
     pub width: u32,
-    /// Height of the picture, pixels.
+    /// The height of the picture, pixels.
     pub height: u32,
-    /// Size of letters and lines: 1 up to 720 pixels width, then larger as far as there is room for
-    /// the words of the walk.
+    /// The size of letters and lines: 1 up to 720 pixels of width, then larger if the words fit.
     pub zoom: f64,
-    /// Whether there is room for the legend beside these words.
+    /// True if the legend fits beside these words.
     pub has_legend: bool,
-    /// Height of the panel, pixels.
+    /// The height of the panel, pixels.
     pub panel: f64,
     crisp: bool,
     look: Look,
@@ -45,11 +43,11 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// The stage for a recording in a picture `width` pixels wide; the height follows from the
-    /// body.
+    /// Creates the stage for a recording in a picture `width` pixels wide; the height follows from
+    /// the body.
     ///
     /// # Errors
-    /// [`PictureError::Size`] if the width is not in [`WIDTHS`].
+    /// Returns [`PictureError::Size`] if the width is not in [`WIDTHS`].
     pub fn new(walk: &Walk, width: u32) -> Result<Self, PictureError> {
         if !WIDTHS.contains(&width) {
             return Err(PictureError::Size { width, height: 0 });
@@ -61,7 +59,7 @@ impl Stage {
         let (first, all) = (walk.extent(0..1), walk.extent(0..walk.len()));
         let size = (first.right - first.left).clamp(1.0, 128.0);
         let standing = first.top.clamp(1.0, 128.0);
-        // Room for hops; a body that is thrown higher leaves the picture for a moment.
+        // Leaves room for hops; a body that is thrown higher leaves the picture for a moment.
         let top = (all.top + 1.0).clamp(standing + 1.5, 1.35 * standing + 2.0);
         let (left, right) = reach(walk);
         let fixed = f64::from(width) / (right - left + 2.0 * MARGIN);
@@ -77,7 +75,7 @@ impl Stage {
         } else {
             vec![(left + right) / 2.0; walk.len()]
         };
-        // Whole pixels: the ground scrolls without flicker.
+        // Whole pixels, so that the ground scrolls without flicker.
         let snap = |x: f64| ((x * scale - f64::from(width) / 2.0).round()) / scale;
         let crisp = false;
         Ok(Stage {
@@ -94,22 +92,22 @@ impl Stage {
         })
     }
 
-    /// The same with hard edges between voxels: fewer colours, so that animations stay small.
+    /// Gives voxels hard edges, whose fewer colours keep animations small.
     pub fn crisp(self) -> Self {
         Stage { crisp: true, ..self }
     }
 
-    /// The same in another look.
+    /// Sets the look of the world.
     pub fn look(self, look: Look) -> Self {
         Stage { look, ..self }
     }
 
-    /// Where a point of the world is in the picture of a frame: pixels, y down.
+    /// Maps a point of the world to pixels, y down, in the picture of a frame.
     pub fn to_pixels(&self, frame: usize, [x, y]: [f64; 2]) -> [f64; 2] {
         [(x - self.left_edge(frame)) * self.scale, self.surface - y * self.scale]
     }
 
-    /// The part of the world in the picture of a frame.
+    /// Returns the part of the world in the picture of a frame.
     pub fn window(&self, frame: usize) -> Window {
         let left = self.left_edge(frame);
         Window {
@@ -128,8 +126,8 @@ impl Stage {
     }
 }
 
-/// Leftmost and rightmost x of the walk, without a body's last throes: half a body more than the
-/// centres at most.
+/// Returns the leftmost and rightmost x of the walk. A body that breaks apart counts only up to
+/// about a body width beyond its centre.
 fn reach(walk: &Walk) -> (f64, f64) {
     let all = walk.extent(0..walk.len());
     let size = walk.recording().body.width() as f64;
@@ -138,9 +136,9 @@ fn reach(walk: &Walk) -> (f64, f64) {
     (all.left.max(low - size - 2.0).min(low), all.right.min(high + size + 2.0).max(high))
 }
 
-/// The centres' x, averaged twice over [`SMOOTHING`] frames on both sides, each rollout by itself,
-/// and never further than `most` voxel lengths from the centre: a body that is hurled away stays in
-/// view.
+/// Returns the camera's x per frame: the centres, averaged twice over [`SMOOTHING`] frames on both
+/// sides, each rollout by itself. It stays within `most` voxel lengths of the centre, which keeps a
+/// body that is hurled away in view.
 fn followed(walk: &Walk, most: f64) -> Vec<f64> {
     let mut path: Vec<f64> = (0..walk.len()).map(|f| walk.centre(f)[0]).collect();
     let mut start = 0;
@@ -166,7 +164,7 @@ fn smooth(path: &mut [f64]) {
     }));
     let n = path.len();
     for (i, x) in path.iter_mut().enumerate() {
-        // Shorter near the ends, and always as far back as forward.
+        // The average shrinks near the ends and stays symmetric.
         let reach = SMOOTHING.min(i).min(n - 1 - i);
         *x = (sums[i + reach + 1] - sums[i - reach]) / (2 * reach + 1) as f64;
     }

@@ -1,4 +1,4 @@
-//! [`Walk`]: a recording, checked once, with the questions pictures ask of it.
+//! [`Walk`]: a recording, validated once, with the queries that pictures need.
 
 use crate::body::Material;
 use crate::draw::error::PictureError;
@@ -6,7 +6,7 @@ use crate::task::recording::{Phase, Recording};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Positions beyond this (voxel lengths) are not drawn: an exploded body.
+/// Positions beyond this (voxel lengths) are not drawn: the body has exploded.
 const FAR: f64 = 1e9;
 
 /// A recording that can be drawn: it has frames, phases in order and corners that exist. Positions
@@ -20,23 +20,23 @@ pub struct Walk<'a> {
     sides: Vec<([usize; 2], u32)>,
 }
 
-/// Smallest and largest x, and largest y, of some points, voxel lengths.
+/// The smallest and largest x, and the largest y, of some points, voxel lengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extent {
-    /// Smallest x.
+    /// The smallest x.
     pub left: f64,
-    /// Largest x.
+    /// The largest x.
     pub right: f64,
-    /// Largest y.
+    /// The largest y.
     pub top: f64,
 }
 
 impl<'a> Walk<'a> {
-    /// Checks a recording.
+    /// Validates a recording.
     ///
     /// # Errors
-    /// [`PictureError::Recording`] if there is no frame or phase, phases are not in order, or a
-    /// corner does not exist.
+    /// Returns [`PictureError::Recording`] if there is no frame or phase, phases are not in order,
+    /// or a corner does not exist.
     pub fn new(recording: &'a Recording) -> Result<Self, PictureError> {
         let bad = |what| Err(PictureError::Recording(what));
         let (frames, phases) = (&recording.frames, &recording.phases);
@@ -58,55 +58,53 @@ impl<'a> Walk<'a> {
         Ok(Walk { recording, centres: finite_centres(recording), fresh, sides: sides(recording) })
     }
 
-    /// The recording.
+    /// Returns the recording.
     pub fn recording(&self) -> &'a Recording {
         self.recording
     }
 
-    /// Number of frames, at least 1.
+    /// Returns the number of frames, at least 1.
     pub fn len(&self) -> usize {
         self.recording.frames.len()
     }
 
-    /// Never: a walk has at least one frame.
+    /// Always returns false: a walk has at least one frame.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Index of the phase a frame belongs to.
+    /// Returns the index of the phase that contains a frame.
     pub fn phase_index(&self, frame: usize) -> usize {
         self.recording.phases.iter().rposition(|p| p.first_frame <= frame).unwrap_or(0)
     }
 
-    /// The phase a frame belongs to.
+    /// Returns the phase that contains a frame.
     pub fn phase(&self, frame: usize) -> &'a Phase {
         &self.recording.phases[self.phase_index(frame)]
     }
 
-    /// The frames of a phase.
+    /// Returns the frames of a phase.
     pub fn phase_frames(&self, phase: usize) -> Range<usize> {
         let first = |p: usize| self.recording.phases.get(p).map_or(self.len(), |p| p.first_frame);
         first(phase)..first(phase + 1)
     }
 
-    /// Whether the robot is put back to its start when the phase begins (the first phase always
-    /// begins there).
+    /// Returns true if the phase begins with the robot reset to its start; the first always does.
     pub fn is_fresh(&self, phase: usize) -> bool {
         self.fresh.get(phase).copied().unwrap_or(false)
     }
 
-    /// Centre of mass at a frame, voxel lengths; the last finite one if it is not finite.
+    /// Returns the centre of mass at a frame, voxel lengths; the last finite one if necessary.
     pub fn centre(&self, frame: usize) -> [f64; 2] {
         self.centres[frame.min(self.centres.len() - 1)]
     }
 
-    /// Signed distance walked since the phase began, voxel lengths.
+    /// Returns the signed distance walked since the phase began, voxel lengths.
     pub fn displacement(&self, frame: usize) -> f64 {
         self.centre(frame)[0] - self.centre(self.phase(frame).first_frame)[0]
     }
 
-    /// The frames of the continuous rollout that a frame is part of, from the last reset up to the
-    /// next.
+    /// Returns the frames of the rollout that contains a frame, from the last reset to the next.
     pub fn rollout(&self, frame: usize) -> Range<usize> {
         let phase = self.phase_index(frame);
         let resets = || self.fresh.iter().enumerate().filter(|(_, f)| **f).map(|(p, _)| p);
@@ -115,8 +113,7 @@ impl<'a> Walk<'a> {
         self.phase_frames(first).start..self.phase_frames(next).start
     }
 
-    /// Every voxel that can be drawn at a frame: its material and corners (clockwise from the top
-    /// left).
+    /// Returns every drawable voxel of a frame: material and corners (clockwise from the top left).
     pub fn voxels(&self, frame: usize) -> impl Iterator<Item = (Material, [[f64; 2]; 4])> {
         let body = &self.recording.body;
         self.recording.voxels.iter().filter_map(move |v| {
@@ -128,12 +125,12 @@ impl<'a> Walk<'a> {
         })
     }
 
-    /// The sides that only one voxel has (the body's outline) at a frame.
+    /// Returns the sides that belong to a single voxel (the body's outline) at a frame.
     pub fn outline(&self, frame: usize) -> impl Iterator<Item = [[f64; 2]; 2]> {
         self.sides_of(frame, true)
     }
 
-    /// The sides that two voxels share at a frame.
+    /// Returns the sides that two voxels share at a frame.
     pub fn seams(&self, frame: usize) -> impl Iterator<Item = [[f64; 2]; 2]> {
         self.sides_of(frame, false)
     }
@@ -143,7 +140,7 @@ impl<'a> Walk<'a> {
         sides.filter_map(move |([a, b], _)| Some([self.point(frame, *a)?, self.point(frame, *b)?]))
     }
 
-    /// What the body reaches in a range of frames; its undeformed box if nothing is finite.
+    /// Returns the extent of the body over some frames, or its undeformed box if nothing is finite.
     pub fn extent(&self, frames: Range<usize>) -> Extent {
         let (height, width) = (self.recording.body.height() as f64, self.recording.body.width() as f64);
         let nothing = Extent { left: f64::INFINITY, right: f64::NEG_INFINITY, top: 0.0 };
@@ -162,8 +159,8 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// Area of a voxel from its corners (clockwise), square voxel lengths; 1 at rest, negative when
-/// turned inside out.
+/// Returns the area of a voxel from its corners (clockwise), square voxel lengths: 1 at rest,
+/// negative when turned inside out.
 pub fn area(quad: &[[f64; 2]; 4]) -> f64 {
     let [a, b, c, d] = quad;
     0.5 * ((c[0] - a[0]) * (b[1] - d[1]) - (b[0] - d[0]) * (c[1] - a[1]))
@@ -184,7 +181,7 @@ fn finite_centres(recording: &Recording) -> Vec<[f64; 2]> {
     centres.collect()
 }
 
-/// Every side (two points) with the number of voxels that have it.
+/// Counts the voxels at every side (two points).
 fn sides(recording: &Recording) -> Vec<([usize; 2], u32)> {
     let mut sides = BTreeMap::new();
     for [a, b, c, d] in recording.voxels.iter().map(|v| v.corners) {

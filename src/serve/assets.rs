@@ -1,16 +1,16 @@
-//! The page's files, part of the program.
+//! The page's files, embedded in the program.
 
 use crate::serve::http::Response;
 
 const JS: &str = "text/javascript; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";
 
-/// The file at a path.
+/// Returns the file at a path.
 pub fn asset(path: &str) -> Option<Response> {
     let (content_type, text) = match path {
         "/" => ("text/html; charset=utf-8", include_str!("page/page.html")),
         "/icon.svg" => ("image/svg+xml", include_str!("page/icon.svg")),
-        // The looks of the page that `replay` writes, and what is new here.
+        // The styles of the page that `replay` writes, and additions.
         "/replay.css" => (CSS, include_str!("../draw/replay.css")),
         "/stages.css" => (CSS, include_str!("../draw/stages.css")),
         "/page.css" => (CSS, include_str!("page/page.css")),

@@ -1,4 +1,4 @@
-//! [`Catalogue`]: the robots that can be watched: published ones, and those of archives.
+//! [`Catalogue`]: the robots that the page offers, published ones and those of archives.
 
 use crate::base::error::Error;
 use crate::body::{Body, VoxelCounts};
@@ -22,126 +22,125 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::{Duration, Instant, SystemTime};
 
-/// Robots from one source. They live in the same world; robots that ship together may look at
-/// different windows of an image.
+/// Robots from one source. They share a world; robots that ship together may have different
+/// windows.
 pub struct Collection {
-    /// What it is called.
+    /// The name on the page.
     pub name: String,
-    /// Where it is from; none: built in.
+    /// The path of the run.json; `None` if it is built in.
     pub path: Option<PathBuf>,
-    /// How its robots were evolved, but for how each sees.
+    /// The configuration of the run, except each robot's stimulus.
     pub config: Config,
-    /// On which data; none: published ones.
+    /// The dataset of the run; `None` for published robots.
     pub dataset: Option<DatasetRef>,
-    /// Generations of the run that are done.
+    /// The number of generations completed.
     pub generations: Option<u64>,
-    /// Bins of the archive's dimensions muscle, sensor and total.
+    /// The bins of the archive's dimensions muscle, sensor and total.
     pub bins: Vec<usize>,
-    /// Names of the tasks.
+    /// The names of the tasks.
     pub tasks: Vec<String>,
     /// The robots, fittest first.
     pub robots: Vec<Entry>,
-    /// Robots that were in the archive when it was read before, the last of them: a page may still
-    /// list them.
+    /// Robots that have left the archive, most recent first: a page may still list them.
     pub gone: Vec<Entry>,
 }
 
-/// A robot that can be watched.
+/// A robot that the page can simulate.
 #[derive(Clone, Debug, Serialize)]
 pub struct Entry {
-    /// Its id or name.
+    /// The id or name.
     pub id: String,
-    /// Its task, as "0|123".
+    /// The task, such as "0|123".
     pub task: String,
-    /// Its fitness on the training images, as its run measured it.
+    /// The fitness on the training images, as measured by its run.
     pub fitness: f64,
-    /// Its voxels by kind.
+    /// The voxel counts by kind.
     pub voxels: VoxelCounts,
-    /// Its cell in the archive; none of a published robot.
+    /// The cell in the archive; empty for a published robot.
     pub cell: Vec<usize>,
-    /// Generation it was born in.
+    /// The generation in which it was born.
     pub generation: Option<u64>,
-    /// How it sees.
+    /// The parameters of its stimulus.
     pub encoding: StimulusParams,
-    /// What its walks say; none if all classes walk the same way.
+    /// The judge of its walks; `None` if all classes walk the same way.
     pub judge: Option<Judge>,
-    /// What an audit found, if one is beside the archive.
+    /// The result of an audit, if one is beside the archive.
     pub audit: Option<Audited>,
-    /// Its body.
+    /// The body.
     pub body: Body,
 }
 
-/// Which body, with all that its simulation depends on.
+/// A body with everything that its simulation depends on.
 #[derive(Clone, Debug)]
 pub struct Who {
     /// The body.
     pub body: Body,
     /// The constants of its world.
     pub physics: Physics,
-    /// Where it starts, and how long it sees an image.
+    /// Its start, and the duration of an image.
     pub protocol: Protocol,
-    /// How it sees.
+    /// The parameters of its stimulus.
     pub encoding: StimulusParams,
-    /// What its walks say; none of a body without a task.
+    /// The judge of its walks; `None` for a body without a task.
     pub judge: Option<Judge>,
 }
 
-/// What an audit found.
+/// The result of an audit.
 #[derive(Clone, Debug, Serialize)]
 pub struct Audited {
     /// The verdict in a word or two.
     pub verdict: &'static str,
-    /// Verdict and reason.
+    /// The verdict with its reason.
     pub conclusion: String,
 }
 
 /// A collection without its robots, for the list of collections.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
-    /// Its number, from 0.
+    /// The number of the collection, from 0.
     pub index: usize,
-    /// What it is called.
+    /// The name on the page.
     pub name: String,
-    /// Where it is from; none: built in.
+    /// The path of the run.json; `None` if it is built in.
     pub path: Option<String>,
-    /// Number of its robots.
+    /// The number of robots.
     pub robots: usize,
-    /// Names of the tasks.
+    /// The names of the tasks.
     pub tasks: Vec<String>,
-    /// The dataset its robots were evolved on.
+    /// The dataset on which the robots evolved.
     pub dataset: String,
-    /// Generations of the run that are done.
+    /// The number of generations completed.
     pub generations: Option<u64>,
-    /// Generations that it was asked for.
+    /// The number of generations requested.
     pub asked: Option<u64>,
-    /// How often it has changed since it was read first.
+    /// The number of changes since the archive was first read.
     pub changes: u64,
-    /// Largest fitness.
+    /// The largest fitness.
     pub best: Option<f64>,
 }
 
-/// An archive whose file is looked at again and again.
+/// An archive whose files are polled for changes.
 struct Watched {
     path: PathBuf,
-    /// What the files were like that were read last.
+    /// The stamps of the files at the last reading.
     stamps: Stamps,
     known: Known,
 }
 
-/// An archive as it was read last.
+/// An archive as of the last reading.
 #[derive(Clone)]
 struct Known {
     collection: Arc<Collection>,
     changes: u64,
 }
 
-/// By what a file that was written anew is known: when, and how long it is.
+/// Identifies a version of a file: its modification time and length.
 type Stamp = (SystemTime, u64);
 
-/// Of a run and of the verdicts on it.
+/// The stamps of a run and of its audit.
 type Stamps = [Option<Stamp>; 2];
 
-/// None of what is no file, or not there.
+/// Returns the stamp of a file, or `None` if there is no such file.
 fn stamp(path: &Path) -> Option<Stamp> {
     let about = path.metadata().ok().filter(|about| about.is_file())?;
     Some((about.modified().ok()?, about.len()))
@@ -151,43 +150,42 @@ fn stamps(run_json: &Path) -> Stamps {
     [stamp(run_json), stamp(&AuditFile::path(run_json))]
 }
 
-/// Most robots that are known though they are in their archive no more.
+/// Maximum number of remembered robots that have left their archive.
 const MOST_GONE: usize = 1000;
 
-/// How often files are looked at, however often the page asks.
+/// Minimum time between polls of the files, however often the page asks.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
 
-/// All that can be watched; what is built in comes first, and of that the trained robots. Archives
-/// are read anew when they have changed, and runs that begin or go on meanwhile are added.
+/// All collections: the built-in ones first, led by the trained robots, then archives. Archives are
+/// reloaded when they change, and runs that begin or continue meanwhile are added.
 pub struct Catalogue {
     built_in: Vec<Arc<Collection>>,
-    /// The archives as they are known; locked only to copy or to replace the list.
+    /// The archives as of the last poll; locked only to copy or replace the list.
     known: Mutex<Arc<[Known]>>,
-    /// Locked while files are read, which may take its time: requests that come meanwhile are
-    /// answered with what is known.
+    /// Locked during polls, which may take time; concurrent requests use the last list.
     watch: Mutex<Watch>,
 }
 
-/// The files that are looked at.
+/// The files to poll.
 struct Watch {
     watched: Vec<Watched>,
-    /// Their paths, as they were named and as they are without links.
+    /// Their paths, as given and with links resolved.
     paths: HashSet<PathBuf>,
-    /// Runs that could not be read as they were then: they are read again when they have changed.
+    /// Runs that could not be read at these stamps; they are retried once they change.
     unreadable: HashMap<PathBuf, Stamps>,
-    /// Where new runs appear.
+    /// The folder where new runs appear.
     runs: PathBuf,
     opened: SystemTime,
     looked: Option<Instant>,
 }
 
 impl Catalogue {
-    /// Reads the archives, and the audits beside them; an audit that cannot be used is told in a
-    /// note, and so is a `newest` run that nobody has named. `runs` is the folder whose runs are added
-    /// when they change.
+    /// Reads the archives, and the audits beside them. An unusable audit becomes a note, and so
+    /// does a `newest` run, which nobody named, if it cannot be read. Changed runs in the folder
+    /// `runs` are added later.
     ///
     /// # Errors
-    /// What is wrong with an archive.
+    /// Returns an error if an archive is invalid.
     pub fn open(
         archives: &[PathBuf],
         newest: Option<&Path>,
@@ -216,7 +214,7 @@ impl Catalogue {
         Ok((Catalogue { built_in, known: Mutex::new(watch.known()), watch: Mutex::new(watch) }, notes))
     }
 
-    /// The archives as they are now; or, while another request reads them, as they were.
+    /// Returns the current archives, or the last known ones while another request polls.
     fn archives(&self) -> Arc<[Known]> {
         let watch = match self.watch.try_lock() {
             Ok(watch) => Some(watch),
@@ -232,7 +230,7 @@ impl Catalogue {
         Arc::clone(&known())
     }
 
-    /// All collections in short.
+    /// Summarises all collections.
     pub fn list(&self) -> Vec<Summary> {
         let short = |(from, asked, changes): (&Collection, Option<u64>, u64)| Summary {
             index: 0,
@@ -255,16 +253,16 @@ impl Catalogue {
         list.map(|(index, summary)| Summary { index, ..summary }).collect()
     }
 
-    /// The collections.
+    /// Returns all collections.
     pub fn collections(&self) -> Vec<Arc<Collection>> {
         let archives = self.archives();
         self.built_in.iter().chain(archives.iter().map(|known| &known.collection)).cloned().collect()
     }
 
-    /// A collection by its number.
+    /// Returns a collection by its number.
     ///
     /// # Errors
-    /// If there is none.
+    /// Returns an error if there is no such collection.
     pub fn collection(&self, index: usize) -> Result<Arc<Collection>, Refusal> {
         let collections = self.collections();
         let unknown =
@@ -272,10 +270,10 @@ impl Catalogue {
         collections.get(index).cloned().ok_or_else(unknown)
     }
 
-    /// How the run of a collection went so far.
+    /// Returns the course of a collection's run so far.
     ///
     /// # Errors
-    /// If there is no such run, or its `metrics.csv` cannot be read.
+    /// Returns an error if there is no such run, or its `metrics.csv` cannot be read.
     pub fn course(&self, index: usize) -> Result<Course, Refusal> {
         let collection = self.collection(index)?;
         let Some(path) = &collection.path else {
@@ -285,13 +283,12 @@ impl Catalogue {
     }
 }
 
-/// A path without links.
+/// Resolves the links of a path.
 fn real(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_path_buf())
 }
 
 impl Watch {
-    /// Adds an archive.
     fn open(&mut self, path: &Path, notes: &mut Vec<String>) -> Result<(), Error> {
         let stamps = stamps(path);
         let collection = archive(RunFile::read(path)?, path, notes)?;
@@ -309,7 +306,7 @@ impl Watch {
         self.watched.iter().map(|watched| watched.known.clone()).collect()
     }
 
-    /// Reads what has changed, and runs that have begun.
+    /// Reloads changed archives, and adds runs that have begun.
     fn look(&mut self) {
         self.watched.iter_mut().for_each(Watched::look);
         for path in self.begun() {
@@ -329,7 +326,7 @@ impl Watch {
         self.looked = Some(Instant::now());
     }
 
-    /// Runs that were written since the page was opened and are not known by this name, by name.
+    /// Returns unknown runs written since the page was opened, sorted by name.
     fn begun(&self) -> Vec<PathBuf> {
         let folders = std::fs::read_dir(&self.runs).into_iter().flatten().flatten();
         let files = folders.map(|folder| folder.path().join(RUN_JSON));
@@ -342,7 +339,7 @@ impl Watch {
 }
 
 impl Watched {
-    /// Reads it anew if it has changed; one that cannot be read stays as it was.
+    /// Reloads the archive if it has changed; an unreadable one stays as it was.
     fn look(&mut self) {
         let now = stamps(&self.path);
         if now == self.stamps {
@@ -361,8 +358,8 @@ impl Watched {
     }
 }
 
-/// The archive of a run that nobody waits for: what is wrong with its text, which will be so until
-/// it changes. None if there is no text, perhaps for the moment.
+/// Reads an archive that nobody named. An error lasts until the text changes; `None` means that the
+/// text is missing, perhaps for the moment.
 fn read(path: &Path) -> Option<Result<Collection, Error>> {
     let text = read_text(path).ok()?;
     let run = RunFile::parse(&text, &path.display().to_string());
@@ -370,19 +367,19 @@ fn read(path: &Path) -> Option<Result<Collection, Error>> {
 }
 
 impl Collection {
-    /// A robot by its id.
+    /// Returns a robot by its id.
     ///
     /// # Errors
-    /// If there is none.
+    /// Returns an error if there is no such robot.
     pub fn robot(&self, id: &str) -> Result<&Entry, Refusal> {
         let found = self.robots.iter().chain(&self.gone).find(|robot| robot.id == id);
         found.ok_or_else(|| Refusal::Unknown(format!("{}: there is no robot {id:?}", self.name)))
     }
 
-    /// A robot by its id, with all that its simulation depends on.
+    /// Returns a robot by its id, with everything that its simulation depends on.
     ///
     /// # Errors
-    /// If there is none.
+    /// Returns an error if there is no such robot.
     pub fn who(&self, id: &str) -> Result<Who, Refusal> {
         let (robot, config) = (self.robot(id)?, &self.config);
         Ok(Who {
@@ -431,8 +428,7 @@ fn published() -> Result<Collection, Error> {
     })
 }
 
-/// The robots of a set that ships with the program. All walk in the same world (which a test
-/// holds).
+/// Loads the robots of a set that ships with the program. They share a world, as a test ensures.
 fn trained(set: &str, name: &str) -> Result<Collection, Error> {
     let mut all = Vec::new();
     for (run, audit) in published::trained(set)? {
@@ -444,7 +440,7 @@ fn trained(set: &str, name: &str) -> Result<Collection, Error> {
     tasks.dedup();
     let first = all.swap_remove(0);
     let name = name.to_string();
-    // Cells are of one run.
+    // Cells belong to a single run.
     Ok(Collection { name, generations: None, dataset: None, bins: Vec::new(), tasks, robots, ..first })
 }
 
@@ -493,7 +489,6 @@ mod tests {
     use super::*;
     use std::fs::File;
 
-    /// A run as text.
     fn run() -> &'static str {
         gallery::text("gallery:zero_one-1", RUN_JSON).unwrap()
     }
@@ -502,13 +497,13 @@ mod tests {
         let path = runs.join(name).join(RUN_JSON);
         std::fs::create_dir_all(runs.join(name)).unwrap();
         std::fs::write(&path, text).unwrap();
-        // Clocks of file systems tick more coarsely than the system's.
+        // File-system clocks tick more coarsely than the system's.
         let file = File::options().write(true).open(&path).unwrap();
         file.set_modified(SystemTime::now() + Duration::from_secs(10)).unwrap();
         path
     }
 
-    /// Names of the folders of the archives after another look.
+    /// Polls again and returns the names of the archives' folders.
     fn known(catalogue: &Catalogue) -> Vec<String> {
         catalogue.watch.lock().unwrap().looked = None;
         let folder = |from: &Summary| {
@@ -523,7 +518,7 @@ mod tests {
         let runs = tempfile::tempdir().unwrap();
         let (catalogue, _) = Catalogue::open(&[], None, runs.path()).unwrap();
         let good = run();
-        // As long, and of the same time.
+        // Same length and time.
         let path = write(runs.path(), "a", &good.replacen('{', "[", 1));
         assert_eq!(known(&catalogue), [""; 0]);
         let modified = path.metadata().unwrap().modified().unwrap();
@@ -533,7 +528,7 @@ mod tests {
         assert_eq!(known(&catalogue), [""; 0]);
         file.set_modified(modified + Duration::from_millis(1)).unwrap();
         assert_eq!(known(&catalogue), ["a"]);
-        // So it is with one that could be read before.
+        // So does an archive that was readable before.
         write(runs.path(), "a", &good.replacen('{', "[", 1));
         file.set_modified(modified).unwrap();
         assert_eq!((known(&catalogue), catalogue.list()[3].changes), (vec!["a".to_string()], 0));

@@ -1,4 +1,4 @@
-//! [`Course`]: how a run went so far, for the page's curves.
+//! [`Course`]: the metrics of a run so far, for the page's curves.
 
 use crate::base::error::Error;
 use crate::shipped::exists;
@@ -8,41 +8,41 @@ use crate::store::names::METRICS;
 use serde::Serialize;
 use std::path::Path;
 
-/// How a run went so far: `metrics.csv`, thinned.
+/// The metrics of a run so far: `metrics.csv`, thinned.
 #[derive(Clone, Debug, Serialize)]
 pub struct Course {
-    /// Generations done.
+    /// The number of generations completed.
     pub done: usize,
-    /// Generations that it was asked for.
+    /// The number of generations requested.
     pub asked: u64,
-    /// Whether a process is at work on it.
+    /// True if a process is working on the run.
     pub under_way: bool,
-    /// Seconds that the rest will take, if it goes on as in its last fifth.
+    /// The estimated seconds for the rest, at the pace of the last fifth.
     pub seconds_left: Option<f64>,
-    /// Generations of which the curves tell.
+    /// The generations of the curves' points.
     pub generation: Vec<usize>,
-    /// QD score.
+    /// The QD score.
     pub qd_score: Vec<f64>,
-    /// Share of cells that are filled.
+    /// The share of cells that are filled.
     pub coverage: Vec<f64>,
-    /// Largest fitness; none before the first elite.
+    /// The largest fitness; `None` before the first elite.
     pub obj_max: Vec<Option<f64>>,
 }
 
-/// Most points of a curve: more than the page has pixels for.
+/// Maximum number of points of a curve: the page has no pixels for more.
 const POINTS: usize = 240;
 
 impl Course {
-    /// Of the run of a run.json that was asked for so many generations.
+    /// Reads the course of a run.json's run; `asked` is the requested number of generations.
     ///
     /// # Errors
-    /// If its `metrics.csv` is there and cannot be read.
+    /// Returns an error if its `metrics.csv` exists and cannot be read.
     pub fn of(archive: &Path, asked: u64) -> Result<Self, Error> {
-        // Runs of the gallery and the atlas come without one, and one that has just begun has none yet.
+        // Runs of the gallery and the atlas lack this file, as do runs that just began.
         let moments = if exists(&archive.with_file_name(METRICS)) { moments(archive)? } else { Vec::new() };
         let done = moments.len();
         let left = asked.saturating_sub(done as u64);
-        // As fast as in its last fifth.
+        // Extrapolates from its last fifth.
         let fifth = (done / 5).max(1);
         let since =
             done.checked_sub(fifth + 1).map(|before| moments[done - 1].seconds - moments[before].seconds);
@@ -62,7 +62,7 @@ impl Course {
     }
 }
 
-/// So many of the generations, evenly, the last always.
+/// Returns up to [`POINTS`] generations, evenly spaced, including the last.
 fn thinned(done: usize) -> Vec<usize> {
     match done {
         0 => Vec::new(),

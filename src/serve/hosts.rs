@@ -1,15 +1,15 @@
-//! [`Hosts`]: by which names a browser may reach the page.
+//! [`Hosts`]: the names under which a browser may reach the page.
 
 use crate::serve::http::{Request, Response};
 use std::net::IpAddr;
 use std::str::FromStr;
 
-/// The names by which a browser may reach the page: those of this machine, on any port, because a
-/// tunnel has its own; and those that the user allows, as of a proxy.
+/// The names under which a browser may reach the page: those of this machine, on any port, because
+/// a tunnel has its own; and those that the user allows, such as a proxy's.
 #[derive(Clone, Debug, Default)]
 pub struct Hosts {
     allowed: Vec<HostName>,
-    /// What the user does to allow another name.
+    /// Tells users how to allow another name.
     advice: &'static str,
 }
 
@@ -32,7 +32,7 @@ impl FromStr for HostName {
     }
 }
 
-/// An address as it stands in a URL: IPv6 in brackets.
+/// Parses an address as written in a URL: IPv6 in brackets.
 fn address(host: &str) -> Option<IpAddr> {
     match host.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')) {
         Some(inner) => inner.parse().ok().map(IpAddr::V6),
@@ -40,10 +40,10 @@ fn address(host: &str) -> Option<IpAddr> {
     }
 }
 
-/// The host in what a Host header holds, without the port; none if it is no such thing.
+/// Returns the host of a Host header, without the port, or `None` if the header is invalid.
 fn host_of(header: &str) -> Option<HostName> {
     let (host, port) = match header.rsplit_once(':') {
-        // Not a colon inside of an IPv6 address.
+        // The colon is not inside an IPv6 address.
         Some((host, port)) if !port.ends_with(']') => (host, port),
         _ => (header, "80"),
     };
@@ -52,16 +52,16 @@ fn host_of(header: &str) -> Option<HostName> {
 }
 
 impl Hosts {
-    /// This machine's names and these; `advice` says in a refusal how to allow another one.
+    /// Allows this machine's names and `allowed`; `advice` tells how to allow another one.
     pub fn new(allowed: Vec<HostName>, advice: &'static str) -> Self {
         Hosts { allowed, advice }
     }
 
-    /// Checks that a request is meant for this page and comes from it. Refused are the names of
-    /// other sites that these let point here (DNS rebinding), and what their pages send.
+    /// Checks that a request is for this page and comes from it. It refuses names that other sites
+    /// point at this machine (DNS rebinding), and requests from other sites' pages.
     ///
     /// # Errors
-    /// What to answer to any other.
+    /// Returns the refusal to send.
     pub fn check(&self, request: &Request) -> Result<(), Response> {
         let Some(host) = request.header("host")? else {
             return Err(Response::refusal(400, "expected a Host header"));
@@ -70,9 +70,9 @@ impl Hosts {
             let text = format!("Host: {host}: expected localhost or 127.0.0.1; {}", self.advice);
             return Err(Response::refusal(403, &text));
         }
-        // Programs like curl send none; browsers always do where it matters.
+        // Programs like curl send no Origin; browsers always do where it matters.
         let origin = request.header("origin")?.filter(|_| request.method == "POST");
-        // A proxy may speak https where this server does not.
+        // A proxy may use https where this server does not.
         let is_own = |origin: &str| {
             let sender = origin.strip_prefix("http://").or_else(|| origin.strip_prefix("https://"));
             sender.is_some_and(|sender| sender.eq_ignore_ascii_case(host))

@@ -1,5 +1,5 @@
-//! As much of HTTP/1.1 as a page on this machine needs: one request per connection, every size and
-//! time bounded.
+//! The subset of HTTP/1.1 that a local page needs: one request per connection, all sizes and times
+//! bounded.
 
 use crate::base::text::one_line;
 use serde::Serialize;
@@ -7,25 +7,25 @@ use std::io::{self, Read, Write};
 use std::net::{Shutdown, TcpStream};
 use std::time::{Duration, Instant};
 
-/// Longest request line with headers \[bytes\].
+/// The longest request line with headers \[bytes\].
 const MAX_HEAD: usize = 16 * 1024;
-/// Most headers.
+/// Maximum number of headers.
 const MAX_HEADERS: usize = 64;
-/// Longest body of a request \[bytes\]: a body and a stimulus of 64 × 64 have room.
+/// The longest body of a request \[bytes\]; a body and a stimulus of 64 × 64 fit.
 pub const MAX_BODY: usize = 256 * 1024;
-/// A request has to be here in this time.
+/// Time limit for a request to arrive.
 const TO_READ: Duration = Duration::from_secs(10);
-/// What is written has to be taken in this time.
+/// Time limit for the reader to take what is written.
 const TO_WRITE: Duration = Duration::from_secs(20);
 
-/// A request.
+/// An HTTP request.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Request {
-    /// As "GET".
+    /// The method, such as "GET".
     pub method: String,
-    /// Without what follows a question mark.
+    /// The path without the query.
     pub path: String,
-    /// What follows it.
+    /// The query: the text after the question mark.
     pub query: String,
     /// Names in lower case.
     headers: Vec<(String, String)>,
@@ -34,11 +34,11 @@ pub struct Request {
 }
 
 impl Request {
-    /// A header's value; none if it is not there.
+    /// Returns a header's value, or `None` if it is missing.
     ///
     /// # Errors
-    /// If it is there more than once: of several, one could say what is allowed, another what is
-    /// meant.
+    /// Returns a refusal if it occurs more than once: one might pass the check and another take
+    /// effect.
     pub fn header(&self, name: &str) -> Result<Option<&str>, Response> {
         let mut found = self.headers.iter().filter(|(own, _)| own == name);
         let first = found.next().map(|(_, value)| value.as_str());
@@ -48,30 +48,30 @@ impl Request {
         }
     }
 
-    /// A value of the query, as it stands there.
+    /// Returns a value of the query, undecoded.
     pub fn asked(&self, key: &str) -> Option<&str> {
         let pairs = self.query.split('&').filter_map(|pair| pair.split_once('='));
         pairs.into_iter().find(|(own, _)| *own == key).map(|(_, value)| value)
     }
 }
 
-/// An answer that is sent as a whole.
+/// A complete response, sent at once.
 #[derive(Debug)]
 pub struct Response {
     status: u16,
     content_type: &'static str,
     body: Vec<u8>,
-    /// For 405: what may be done.
+    /// The allowed methods, for status 405.
     allow: Option<&'static str>,
 }
 
 impl Response {
-    /// A file that is part of the program.
+    /// Creates the response for an embedded file.
     pub fn file(content_type: &'static str, text: &str) -> Self {
         Response { status: 200, content_type, body: text.as_bytes().to_vec(), allow: None }
     }
 
-    /// A value as JSON.
+    /// Creates a JSON response.
     pub fn json(value: &impl Serialize) -> Self {
         match serde_json::to_vec(value) {
             Ok(body) => Response { status: 200, content_type: "application/json", body, allow: None },
@@ -79,26 +79,26 @@ impl Response {
         }
     }
 
-    /// Done, nothing to say.
+    /// Creates a response without content.
     pub fn done() -> Self {
         Response { status: 204, content_type: "text/plain; charset=utf-8", body: Vec::new(), allow: None }
     }
 
-    /// An error with one line.
+    /// Creates an error response of one line.
     pub fn refusal(status: u16, line: &str) -> Self {
         let body = format!("{}\n", one_line(line)).into_bytes();
         Response { status, content_type: "text/plain; charset=utf-8", body, allow: None }
     }
 
-    /// Another method was expected.
+    /// Creates the response to a request with a wrong method.
     pub fn wrong_method(allow: &'static str) -> Self {
         Response { allow: Some(allow), ..Response::refusal(405, &format!("expected {allow}")) }
     }
 
-    /// Sends it; of an answer to HEAD the head only.
+    /// Sends the response; only the head if `head_only`, in answer to HEAD.
     ///
     /// # Errors
-    /// If the reader has gone.
+    /// Returns an error if the reader has gone.
     pub fn send(&self, stream: &mut TcpStream, head_only: bool) -> io::Result<()> {
         let allow = self.allow.map_or(String::new(), |methods| format!("Allow: {methods}\r\n"));
         let length = format!("Content-Length: {}\r\n", self.body.len());
@@ -112,8 +112,7 @@ impl Response {
     }
 }
 
-/// The head of an answer. The page may load nothing but what this server has, and be shown in no
-/// other page.
+/// Formats a response's head. The page may load only from this server; no other page may embed it.
 fn head(status: u16, content_type: &str, more: &str) -> String {
     let reason = match status {
         200 => "OK",
@@ -139,21 +138,20 @@ fn head(status: u16, content_type: &str, more: &str) -> String {
     )
 }
 
-/// Begins an answer that is a stream of server-sent events, which lasts until the connection is
-/// closed.
+/// Begins a stream of server-sent events, which lasts until the connection is closed.
 ///
 /// # Errors
-/// If the reader has gone.
+/// Returns an error if the reader has gone.
 pub fn begin_events(stream: &mut TcpStream) -> io::Result<()> {
     stream.set_nodelay(true)?;
-    // Or a proxy keeps events until there are many.
+    // Keeps proxies from buffering events.
     stream.write_all(head(200, "text/event-stream", "X-Accel-Buffering: no\r\n").as_bytes())
 }
 
-/// Reads a request. `None`: there was none.
+/// Reads a request, or `None` if the connection sent nothing.
 ///
 /// # Errors
-/// What to answer to something that is no request.
+/// Returns the refusal to send if the data are no valid request.
 pub fn read(stream: &mut TcpStream) -> Result<Option<Request>, Response> {
     let broken = |error: &io::Error| Response::refusal(400, &format!("the request cannot be read: {error}"));
     let deadline = Instant::now() + TO_READ;
@@ -171,7 +169,7 @@ pub fn read(stream: &mut TcpStream) -> Result<Option<Request>, Response> {
             Ok(0) if bytes.is_empty() => return Ok(None),
             Ok(0) => return Err(Response::refusal(400, "the request ends in its head")),
             Ok(_) => {}
-            // A browser opens connections that it then does not use.
+            // Browsers open connections that they then do not use.
             Err(_) if bytes.is_empty() => return Ok(None),
             Err(_) => return Err(Response::refusal(408, "the request did not come in time")),
         }
@@ -200,7 +198,7 @@ fn more(stream: &mut TcpStream, bytes: &mut Vec<u8>, deadline: Instant) -> io::R
     Ok(count)
 }
 
-/// A request without its body, and where that begins; `None` if the head is not whole yet.
+/// Parses a request without its body, and its offset; `None` if the head is incomplete.
 fn parse(bytes: &[u8]) -> Result<Option<(Request, usize)>, Response> {
     let mut space = [httparse::EMPTY_HEADER; MAX_HEADERS];
     let mut head = httparse::Request::new(&mut space);
@@ -247,7 +245,7 @@ fn length(request: &Request) -> Result<usize, Response> {
     }
 }
 
-/// Ends a connection so that what was sent arrives: closing with unread bytes would throw it away.
+/// Closes a connection so that sent data arrive: closing with unread bytes would discard them.
 pub fn close(stream: &mut TcpStream) {
     let _ = stream.shutdown(Shutdown::Write);
     let until = Instant::now() + Duration::from_millis(500);

@@ -1,5 +1,5 @@
-//! [`ImageSets`]: test images to show: the built-in digits always, datasets of the archives where
-//! they are found.
+//! [`ImageSets`]: the test images that the page offers: always the built-in digits, and datasets of
+//! the archives if available.
 
 use crate::base::Grid;
 use crate::base::error::Error;
@@ -10,53 +10,53 @@ use crate::serve::refusal::Refusal;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Most images in one answer.
+/// Maximum number of images in one response.
 pub const MAX_PAGE: usize = 60;
 
-/// An image by its place.
+/// The identifier of an image.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct ImageName {
-    /// Name of its set.
+    /// The name of its set.
     pub set: String,
-    /// Its index among the test images.
+    /// The index among the test images.
     pub index: usize,
 }
 
-/// A test image.
+/// A test image with its class and pixels.
 #[derive(Clone, Debug, Serialize)]
 pub struct TestImage {
-    /// Its index among the test images.
+    /// The index among the test images.
     pub index: usize,
-    /// Its class.
+    /// The class.
     pub label: u8,
-    /// Its pixels, 0 paper … 255 ink, rows from the top.
+    /// The pixels, 0 paper … 255 ink, rows from the top.
     pub pixels: Grid<u8>,
 }
 
-/// What a set has.
+/// The contents of a set.
 #[derive(Clone, Debug, Serialize)]
 pub struct SetSummary {
-    /// Its name.
+    /// The name of the set.
     pub name: String,
-    /// Number of test images by class.
+    /// The number of test images by class.
     pub classes: Vec<(u8, usize)>,
 }
 
-/// The test images that can be shown.
+/// The test images that the page offers.
 pub struct ImageSets {
     sets: Vec<Dataset>,
 }
 
 impl ImageSets {
-    /// Loads what is there; a dataset that is not is told in a note.
+    /// Loads the available datasets; a missing one becomes a note.
     ///
     /// # Errors
-    /// If the built-in digits cannot be made (which does not happen).
+    /// Returns an error if the built-in digits cannot be made (which does not happen).
     pub fn open(catalogue: &Catalogue, data: Option<&Path>) -> Result<(Self, Vec<String>), Error> {
         let refuse = |error: crate::data::dataset::DatasetError| Error::input(error.to_string());
         let mut sets = Vec::new();
-        // With the name of the set that each is about.
+        // Each with the name of its set.
         let mut notes: Vec<(&String, String)> = Vec::new();
         let collections = catalogue.collections();
         for collection in &collections {
@@ -72,12 +72,12 @@ impl ImageSets {
             let (own, config) = (collection.dataset.as_ref(), &collection.config);
             match load_dataset_of(own, config, &whereabouts, &[Split::Test]) {
                 Ok(set) => {
-                    // Robots of another archive may know better where it is.
+                    // Robots of another archive may know where it is.
                     notes.retain(|(of, _)| *of != name);
                     sets.push(set);
                 }
                 Err(error) => {
-                    // Of several runs that lack the same folder the first says so.
+                    // If several runs lack the same folder, only the first reports it.
                     let run = collection.path.as_ref().map(|path| format!("{}: ", path.display()));
                     let of_run = run.and_then(|run| error.message.strip_prefix(&run));
                     let what = of_run.unwrap_or(&error.message);
@@ -91,7 +91,7 @@ impl ImageSets {
         Ok((ImageSets { sets }, notes.into_iter().map(|(_, note)| note).collect()))
     }
 
-    /// What there is.
+    /// Summarises all sets.
     pub fn list(&self) -> Vec<SetSummary> {
         let classes = |set: &Dataset| {
             let classes = set.classes(Split::Test).into_iter();
@@ -108,10 +108,10 @@ impl ImageSets {
         found.ok_or_else(|| Refusal::Unknown(format!("there is no set of images {name:?}")))
     }
 
-    /// `count` images of a class, starting at number `from`.
+    /// Returns `count` images of a class, starting at number `from`.
     ///
     /// # Errors
-    /// If there is no such set.
+    /// Returns an error if there is no such set.
     pub fn page(&self, set: &str, class: u8, from: usize, count: usize) -> Result<Vec<TestImage>, Refusal> {
         let dataset = self.set(set)?;
         let indices = dataset.indices_of(Split::Test, class).iter().skip(from).take(count.min(MAX_PAGE));
@@ -124,10 +124,10 @@ impl ImageSets {
             .collect()
     }
 
-    /// An image.
+    /// Returns an image.
     ///
     /// # Errors
-    /// If there is none of that name.
+    /// Returns an error if there is no such image.
     pub fn image(&self, name: &ImageName) -> Result<TestImage, Refusal> {
         let unknown = |error: crate::data::dataset::DatasetError| Refusal::Unknown(error.to_string());
         let (set, index) = (self.set(&name.set)?, name.index);

@@ -1,5 +1,5 @@
-//! `morphcog serve`: what the page asks for, answered with the real engine. Knows nothing of HTTP:
-//! that is [`server`]'s.
+//! `morphcog serve`: answers the page's requests with the real engine. Only [`server`] and its
+//! helpers know HTTP.
 
 pub mod assets;
 pub mod catalogue;
@@ -31,84 +31,84 @@ use serde::Serialize;
 use simulations::Simulations;
 use std::path::PathBuf;
 
-/// What to serve.
+/// The options of `morphcog serve`.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// The run.json files to browse.
     pub archives: Vec<PathBuf>,
-    /// One more that was not asked for by name: it is left out, with a note, if it cannot be read.
+    /// Another run, not named by the user: if it cannot be read, a note says so.
     pub newest: Option<PathBuf>,
-    /// Where the data are, if the command line says.
+    /// The folder of the data, if the command line gives it.
     pub data: Option<PathBuf>,
     /// The folder whose runs appear on the page when they change.
     pub runs: PathBuf,
-    /// By which names the page may be reached.
+    /// The names under which the page may be reached.
     pub hosts: Hosts,
 }
 
-/// Everything a page can ask for.
+/// Everything that a page can request.
 pub struct Service {
-    /// Robots to choose from.
+    /// The robots to choose from.
     pub catalogue: Catalogue,
-    /// Test images to choose from.
+    /// The test images to choose from.
     pub images: ImageSets,
-    /// What runs at the moment.
+    /// The simulations that are running.
     pub simulations: Simulations,
-    /// The threads that the robots of teams walk in.
+    /// The threads in which the robots of teams walk.
     pub pool: rayon::ThreadPool,
-    /// By which names it may be reached.
+    /// The names under which the page may be reached.
     pub hosts: Hosts,
 }
 
-/// What `/api/status` says.
+/// The response to `/api/status`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Status {
-    /// Version of the program.
+    /// The version of the program.
     pub version: &'static str,
-    /// Simulations running now.
+    /// The number of simulations running now.
     pub simulations: usize,
-    /// Most simulations at once.
+    /// The maximum number of simulations at once.
     pub max_simulations: usize,
-    /// Simulations begun so far.
+    /// The number of simulations begun so far.
     pub begun: u64,
 }
 
-/// What a body is found to be.
+/// The result of checking a body.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Checked {
-    /// Whether all its voxels hang together, and there is one.
+    /// True if there is a voxel and all voxels are connected.
     pub connected: bool,
-    /// Muscle voxels.
+    /// The number of muscle voxels.
     pub muscle: usize,
-    /// Sensor voxels.
+    /// The number of sensor voxels.
     pub sensor: usize,
-    /// All voxels.
+    /// The number of all voxels.
     pub total: usize,
-    /// Why it cannot live; none if it can.
+    /// The reason why it is not viable; `None` if it is.
     pub problem: Option<&'static str>,
-    /// What is worth knowing of one that can.
+    /// A remark on a viable body.
     pub note: Option<&'static str>,
 }
 
-/// A scenario of `morphcog simulate`, as far as the page can show it.
+/// A scenario of `morphcog simulate`, as far as the page supports it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Loaded {
     /// The body.
     pub body: Body,
-    /// What it sees; none: all dark.
+    /// The stimulus; `None` is all dark.
     pub stimulus: Option<crate::base::Grid<f64>>,
-    /// Length of the simulation, cut to what the page allows.
+    /// The length of the simulation, cut to the page's limit.
     pub control_steps: u64,
-    /// What of it is not shown.
+    /// A note on unsupported parts.
     pub note: Option<String>,
 }
 
 impl Service {
-    /// Reads the archives and finds the images; what could not be read or found without being asked
-    /// for by name is told in the notes.
+    /// Reads the archives and finds the images. Files that the user did not name and that are
+    /// missing or unreadable become notes.
     ///
     /// # Errors
-    /// What is wrong with an archive; if the system has no threads left.
+    /// Returns an error if an archive is invalid, or the system has no threads left.
     pub fn open(options: &Options) -> Result<(Self, Vec<String>), Error> {
         let Options { archives, newest, data, runs, hosts } = options;
         let (catalogue, mut notes) = Catalogue::open(archives, newest.as_deref(), runs)?;
@@ -118,7 +118,7 @@ impl Service {
         Ok((Service { catalogue, images, simulations, pool, hosts: hosts.clone() }, notes))
     }
 
-    /// How it is doing.
+    /// Returns the current status.
     pub fn status(&self) -> Status {
         Status {
             version: env!("CARGO_PKG_VERSION"),
@@ -128,7 +128,7 @@ impl Service {
         }
     }
 
-    /// Whether a body can live.
+    /// Checks if a body is viable.
     pub fn check(&self, body: &Body) -> Checked {
         let counts = body.counts();
         let connected = body.is_connected();
@@ -149,7 +149,7 @@ impl Service {
     /// Reads a scenario of `morphcog simulate`.
     ///
     /// # Errors
-    /// What is wrong with it, or that the page cannot show it.
+    /// Returns an error if it is invalid, or the page does not support it.
     pub fn load(&self, text: &str) -> Result<Loaded, Refusal> {
         let scenario = Scenario::parse(text, "scenario")?;
         if *scenario.physics() != Physics::default() {
@@ -176,10 +176,10 @@ impl Service {
         })
     }
 
-    /// What a request for a simulation means.
+    /// Turns a request into a plan for a simulation.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// Returns an error if the request is invalid.
     pub fn plan(&self, request: request::SimulationRequest) -> Result<Plan, Refusal> {
         request.plan(&self.catalogue, &self.images)
     }

@@ -1,17 +1,17 @@
-//! [`Refusal`]: why a request is not answered.
+//! [`Refusal`]: the reasons for refusing a request.
 
 use crate::base::error::Error;
 
-/// Why a request is not answered; each with one clear line.
+/// A reason for refusing a request, with one clear line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
-    /// It is wrong.
+    /// The request is invalid.
     #[error("{0}")]
     Wrong(String),
-    /// It names what is not there.
+    /// The request names something that does not exist.
     #[error("{0}")]
     Unknown(String),
-    /// As many simulations as may run at once are running.
+    /// The maximum number of simulations is running.
     #[error("{0}")]
     Busy(String),
 }

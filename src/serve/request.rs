@@ -1,5 +1,4 @@
-//! Requests for simulations: from what the page sends to what is simulated, everything checked and
-//! bounded.
+//! Requests for simulations: validates and bounds the page's input and turns it into plans.
 
 use crate::base::Grid;
 use crate::body::Body;
@@ -11,29 +10,28 @@ use crate::task::protocol::Protocol;
 use crate::task::stimulus::{Encoding, Reduction, StimulusParams, stimulus};
 use serde::Deserialize;
 
-/// Most control steps in a simulation, images changed on the way included: a hundred actuation
-/// cycles.
+/// Maximum number of control steps in a simulation, across image changes: a hundred cycles.
 pub const MAX_STEPS: u32 = 5000;
-/// Largest side of a drawing \[pixels\].
+/// The largest side of a drawing \[pixels\].
 pub const MAX_PICTURE: usize = 128;
-/// Fastest pace that is not "as fast as possible".
+/// The fastest pace other than "as fast as possible".
 pub const MAX_SPEED: f64 = 16.0;
 
-/// Which body, and how it sees: a robot of a collection, or any body.
+/// A robot of a collection, or any body with the parameters of its stimulus.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Subject {
-    /// Number of the collection.
+    /// The number of the collection.
     archive: Option<usize>,
-    /// Id of the robot there.
+    /// The id of the robot there.
     robot: Option<String>,
-    /// Or a body of one's own.
+    /// The body, in place of a robot.
     body: Option<Body>,
-    /// How that body's stimulus is made from an image.
+    /// The stimulus parameters of that body.
     encoding: Option<StimulusParams>,
 }
 
-/// What it is shown: at most one of the three; none is dark.
+/// The visible image, at most one of the three; none is dark.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shown {
@@ -41,26 +39,26 @@ pub struct Shown {
     drawing: Option<Grid<u8>>,
     /// A test image.
     image: Option<ImageName>,
-    /// A stimulus as it is, one number from 0 to 1 per voxel.
+    /// A finished stimulus, one number from 0 to 1 per voxel.
     stimulus: Option<Grid<f64>>,
 }
 
-/// A simulation to begin.
+/// A request to begin a simulation.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SimulationRequest {
     /// The robot.
     subject: Subject,
-    /// What it sees.
+    /// The image.
     #[serde(default)]
     shown: Shown,
-    /// For how many control steps an image is shown; default: the robot's protocol.
+    /// The control steps per image; the default is the robot's protocol.
     control_steps: Option<u32>,
-    /// Times real time; 0: as fast as possible. Default 1.
+    /// The speed as a multiple of real time; 0: as fast as possible. Default 1.
     speed: Option<f64>,
 }
 
-/// What a body sees of an image, without a simulation.
+/// A request for a body's stimulus, without a simulation.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SeeRequest {
@@ -69,32 +67,32 @@ pub struct SeeRequest {
     shown: Shown,
 }
 
-/// A change of a simulation that goes on.
+/// A request to change a running simulation.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ChangeRequest {
-    /// What it sees from now on.
+    /// The image from now on.
     pub shown: Option<Shown>,
-    /// Times real time; 0: as fast as possible.
+    /// The speed as a multiple of real time; 0: as fast as possible.
     pub speed: Option<f64>,
-    /// Whether it stands still.
+    /// True to pause, false to continue.
     pub paused: Option<bool>,
 }
 
-/// How fast a simulation goes.
+/// The pace of a simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pace {
-    /// So many times real time.
+    /// A multiple of real time.
     Times(f64),
     /// As fast as possible.
     Free,
 }
 
 impl Pace {
-    /// From a number, 0 for as fast as possible.
+    /// Creates a pace from a number, 0 for as fast as possible.
     ///
     /// # Errors
-    /// If it is no speed.
+    /// Returns an error if it is no valid speed.
     pub fn of(speed: f64) -> Result<Self, Refusal> {
         match speed {
             0.0 => Ok(Pace::Free),
@@ -106,23 +104,23 @@ impl Pace {
     }
 }
 
-/// What is seen, and of which class it is if that is known.
+/// A stimulus with its class, if that is known.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Seen {
-    /// H × W in \[0, 1\].
+    /// The stimulus, H × W in \[0, 1\].
     pub stimulus: Grid<f64>,
     /// The class of a test image.
     pub label: Option<u8>,
 }
 
-/// A simulation that can be begun.
+/// A valid plan for a simulation.
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// The robot.
     pub who: Who,
-    /// What it sees at first.
+    /// The first stimulus.
     pub seen: Seen,
-    /// How fast.
+    /// The pace.
     pub pace: Pace,
 }
 
@@ -153,10 +151,10 @@ impl Subject {
 }
 
 impl Shown {
-    /// As a body sees it.
+    /// Converts the image to the stimulus of a body.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// Returns an error if the image is invalid.
     pub fn seen(self, who: &Who, images: &ImageSets) -> Result<Seen, Refusal> {
         let (height, width) = (who.body.height(), who.body.width());
         let reduce = |pixels: &Grid<u8>| {
@@ -211,20 +209,20 @@ impl SimulationRequest {
 }
 
 impl SeeRequest {
-    /// What the body sees.
+    /// Returns the body's stimulus.
     ///
     /// # Errors
-    /// What is wrong with the request.
+    /// Returns an error if the request is invalid.
     pub fn seen(self, catalogue: &Catalogue, images: &ImageSets) -> Result<Seen, Refusal> {
         let who = self.subject.find(catalogue)?;
         self.shown.seen(&who, images)
     }
 }
 
-/// Reads a request.
+/// Parses a request.
 ///
 /// # Errors
-/// What is wrong with it, with its key.
+/// Returns an error, with the key, if the request is invalid.
 pub fn read<T: serde::de::DeserializeOwned>(body: &[u8]) -> Result<T, Refusal> {
     let text =
         std::str::from_utf8(body).map_err(|_| Refusal::Wrong("request: not UTF-8 text".to_string()))?;

@@ -1,4 +1,4 @@
-//! Which answer a request gets.
+//! Dispatches requests to their answers.
 
 use crate::body::Body;
 use crate::draw::html::materials;
@@ -11,13 +11,13 @@ use crate::serve::{Service, request, team};
 use serde::Deserialize;
 use serde_json::json;
 
-/// What is done about a request.
+/// The reaction to a request.
 pub enum Reply {
-    /// It is answered as a whole.
+    /// Sends a complete response.
     Whole(Response),
-    /// A simulation begins.
+    /// Begins a simulation.
     Simulation(Box<Plan>),
-    /// A team begins to walk.
+    /// Begins a team's walk.
     Team(Box<TeamPlan>),
 }
 
@@ -93,7 +93,7 @@ pub fn reply(service: &Service, request: &Request) -> Reply {
     }
 }
 
-/// What a refusal is in HTTP.
+/// Converts a refusal to an HTTP response.
 pub fn refused(refusal: Refusal) -> Response {
     let status = match refusal {
         Refusal::Wrong(_) => 400,

@@ -1,4 +1,4 @@
-//! `morphcog serve`: the page, and what it asks for, over HTTP on this machine only.
+//! `morphcog serve`: serves the page and its requests over HTTP, on this machine only.
 
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
@@ -15,11 +15,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-/// Most connections at once; a browser needs about six.
+/// Maximum number of connections at once; a browser needs about six.
 const MAX_CONNECTIONS: usize = 64;
-/// How long simulations may take to end when the server ends.
+/// Time limit for simulations to end when the server ends.
 const TO_END: Duration = Duration::from_secs(2);
-/// How often the server looks whether it is to end.
+/// Time between checks if the server should end.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// A server that is bound to its port.
@@ -30,10 +30,10 @@ pub struct Server {
 }
 
 impl Server {
-    /// Binds a port of this machine that no other machine can reach; 0: any that is free.
+    /// Binds a port that only this machine can reach; 0 means any free port.
     ///
     /// # Errors
-    /// If the port is taken, or the system does not allow it.
+    /// Returns an error if the port is taken or the system refuses.
     pub fn bind(service: Service, port: u16) -> Result<Self, Error> {
         let refuse = |error: std::io::Error| match error.kind() {
             std::io::ErrorKind::AddrInUse => {
@@ -46,15 +46,15 @@ impl Server {
         Ok(Server { listener, address, service: Arc::new(service) })
     }
 
-    /// Where the page is.
+    /// Returns the page's URL.
     pub fn url(&self) -> String {
         format!("http://{}/", self.address)
     }
 
-    /// Serves until `stop` is set; then ends all simulations.
+    /// Serves until `stop` is set, then ends all simulations.
     ///
     /// # Errors
-    /// If the system has no thread left for it.
+    /// Returns an error if the system has no thread left.
     pub fn run(self, stop: &AtomicBool) -> Result<(), Error> {
         let Server { listener, address, service } = self;
         let ended = Arc::new(AtomicBool::new(false));
@@ -65,7 +65,7 @@ impl Server {
         }
         ended.store(true, Ordering::Relaxed);
         service.simulations.close();
-        // The thread that accepts wakes up, and sees.
+        // Wakes the accepting thread, so that it notices.
         drop(TcpStream::connect_timeout(&address, LOOK));
         let until = Instant::now() + TO_END;
         while service.simulations.running() > 0 && Instant::now() < until {
@@ -82,7 +82,7 @@ fn accept(listener: &TcpListener, service: &Arc<Service>, ended: &AtomicBool) {
             return;
         }
         let Ok(mut stream) = stream else {
-            // Too many open files, or a connection that went at once: there will be others.
+            // Too many open files, or a connection that closed at once; later ones may succeed.
             std::thread::sleep(LOOK);
             continue;
         };
@@ -94,7 +94,7 @@ fn accept(listener: &TcpListener, service: &Arc<Service>, ended: &AtomicBool) {
         }
         let place = Place(Arc::clone(&connections));
         let service = Arc::clone(service);
-        // If the system has no thread left, the connection is closed and its place is free again.
+        // If the system has no thread left, the connection closes and its slot is freed.
         let _ = threads::start("connection", move || {
             let _place = place;
             connection(&service, &mut stream);
@@ -102,7 +102,7 @@ fn accept(listener: &TcpListener, service: &Arc<Service>, ended: &AtomicBool) {
     }
 }
 
-/// A connection's place among those at once, free again however the connection ends.
+/// A slot among the connections, freed however the connection ends.
 struct Place(Arc<AtomicUsize>);
 
 impl Drop for Place {
@@ -127,23 +127,21 @@ fn connection(service: &Service, stream: &mut TcpStream) {
                 let lives = |slot: &Slot, tell: &mut Tell| {
                     team::live(slot, &plan, &service.pool, |event| tell(&stream::of_team(&event)))
                 };
-                // A team takes one place.
+                // A team takes one slot.
                 let Some(refusal) = simulation(service, &plan.members[0].1, lives, stream) else { return };
                 (refusal, false)
             }
         },
     };
-    // The page was closed: the error has no reader.
+    // If the page was closed, nobody reads the error.
     if response.send(stream, head_only).is_ok() {
         http::close(stream);
     }
 }
 
-/// Sends an event.
 type Tell<'a> = dyn FnMut(&str) -> Result<(), Gone> + 'a;
 
-/// Runs a simulation over a connection; it ends when that does. What is to be answered if there is
-/// no place for it.
+/// Runs a simulation as long as the connection lasts, or returns the refusal to send.
 fn simulation(
     service: &Service,
     who: &Who,
@@ -160,7 +158,7 @@ fn simulation(
     let begun = http::begin_events(stream).map_err(|_| Gone);
     let told = begun
         .and_then(|()| lives(&slot, &mut |event: &str| stream.write_all(event.as_bytes()).map_err(|_| Gone)));
-    // The thread that watches the connection has nothing left to do.
+    // Stops the thread that watches the connection.
     slot.control.end();
     drop(slot);
     if told.is_ok() {
@@ -169,11 +167,11 @@ fn simulation(
     None
 }
 
-/// Ends a simulation when the other side closes its connection: a write would fail only after that,
-/// and in between the simulation would go on.
+/// Ends a simulation when the client closes its connection. A failed write would notice only later,
+/// and meanwhile the simulation would go on.
 ///
 /// # Errors
-/// If the system has no file or no thread left for it.
+/// Returns an error if the system has no file or no thread left.
 fn end_with(stream: &TcpStream, control: &Arc<Control>) -> Result<(), Error> {
     let failed = |error: io::Error| Error::other(format!("the connection cannot be watched: {error}"));
     let (stream, control) = (stream.try_clone().map_err(failed)?, Arc::clone(control));
@@ -181,7 +179,7 @@ fn end_with(stream: &TcpStream, control: &Arc<Control>) -> Result<(), Error> {
     let watch = move || {
         while !control.is_over() {
             match stream.peek(&mut [0]) {
-                // A client that keeps sending.
+                // The client keeps sending.
                 Ok(count) if count > 0 => std::thread::sleep(LOOK),
                 Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}

@@ -1,4 +1,4 @@
-//! One simulation at the pace that is asked for, reported moment by moment.
+//! Runs one simulation at the requested pace and reports every moment.
 
 use crate::serve::request::{MAX_STEPS, Pace, Plan, Seen};
 use crate::serve::simulations::{Control, Slot};
@@ -9,71 +9,71 @@ use crate::task::rollout::Rollout;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Control steps in a second of a robot's own time.
+/// Control steps per second of a robot's own time.
 pub const STEPS_PER_SECOND: f64 = 50.0;
-/// Moments that are sent together when the simulation runs as fast as possible.
+/// The number of moments in a message when the simulation runs as fast as possible.
 const BATCH: u32 = 20;
-/// Time from one telling to the next in real time.
+/// Time between messages in real time.
 const TICK: Duration = Duration::from_millis(40);
-/// What takes longer is told in parts.
+/// Batches that take longer are sent in parts.
 const MOST_AT_ONCE: Duration = Duration::from_millis(100);
-/// How often a paused simulation says that it is there; so it notices that the page was closed.
+/// Interval at which a paused simulation sends a sign of life, to notice a closed page.
 pub(super) const HEARTBEAT: Duration = Duration::from_millis(400);
-/// A simulation that cannot keep its pace does not try to make up for more than this.
+/// Maximum delay, in seconds, that a slow simulation tries to make up for.
 const MOST_BEHIND: f64 = 0.5;
 
-/// What a simulation reports.
+/// An event of a simulation.
 pub enum Event<'a> {
-    /// It begins, at rest.
+    /// The simulation begins, at rest.
     Begin {
-        /// Its number.
+        /// The number of the simulation.
         id: u64,
-        /// The robot, and what is shown for how long.
+        /// The robot, its image and the durations.
         plan: &'a Plan,
         /// The voxels with their corners.
         voxels: Vec<VoxelCorners>,
-        /// How it stands.
+        /// The initial pose.
         frame: Frame,
     },
-    /// Another image is shown.
+    /// The image changes.
     Seen {
-        /// After how many control steps.
+        /// The control steps so far.
         step: u32,
-        /// The last control step under it.
+        /// The last control step with this image.
         until: u32,
         /// The image.
         seen: &'a Seen,
     },
-    /// It went on.
+    /// The simulation advanced.
     Moments {
-        /// Control steps simulated at the last of the moments.
+        /// The control steps at the last of the moments.
         step: u32,
         /// The moments, one per control step.
         frames: &'a [Frame],
-        /// What it has come to.
+        /// The answer so far.
         answer: Answer,
     },
-    /// It stands still.
+    /// The simulation is paused.
     Still,
-    /// It has ended.
+    /// The simulation has ended.
     End {
-        /// Control steps simulated.
+        /// The control steps simulated.
         step: u32,
-        /// What it has come to.
+        /// The final answer.
         answer: Answer,
-        /// Why it ended early, if it did.
+        /// The reason if it ended early.
         unstable: Option<String>,
     },
 }
 
-/// Nobody listens any more.
+/// The listener has gone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Gone;
 
-/// Runs a simulation; `tell` gets what happens.
+/// Runs a simulation and passes its events to `tell`.
 ///
 /// # Errors
-/// [`Gone`] as soon as `tell` says so.
+/// Returns [`Gone`] as soon as `tell` does.
 pub fn live(slot: &Slot, plan: &Plan, mut tell: impl FnMut(Event) -> Result<(), Gone>) -> Result<(), Gone> {
     let who = &plan.who;
     let judge = who.judge.as_ref();
@@ -123,7 +123,7 @@ pub fn live(slot: &Slot, plan: &Plan, mut tell: impl FnMut(Event) -> Result<(), 
             }
             step += 1;
             frames.push(rollout.frame());
-            // Large bodies are told of as they live.
+            // Large bodies are reported in parts, to stay live.
             if begin.elapsed() > MOST_AT_ONCE {
                 break;
             }
@@ -135,11 +135,11 @@ pub fn live(slot: &Slot, plan: &Plan, mut tell: impl FnMut(Event) -> Result<(), 
     }
 }
 
-/// When the next control steps are due.
+/// Decides when control steps are due.
 pub(super) struct Clock {
     pace: Pace,
     paused: bool,
-    /// The moment at which `first` control steps had been simulated; none before the first look.
+    /// The time at which `first` control steps had been simulated; `None` before the first call.
     begin: Option<(Instant, u32)>,
 }
 
@@ -156,7 +156,7 @@ impl Clock {
         }
     }
 
-    /// Number of control steps that are due; none if it is paused.
+    /// Returns the number of control steps that are due, or `None` if paused.
     pub(super) fn due(&mut self, step: u32) -> Option<u32> {
         let Pace::Times(times) = self.pace else {
             return (!self.paused).then_some(BATCH);
@@ -196,7 +196,7 @@ mod tests {
     fn a_simulation_ends_in_the_middle_of_a_control_step_when_it_is_to_end() {
         let who = Who {
             body: "3434/4343".parse().unwrap(),
-            // A control step of a quarter of an hour.
+            // A control step takes a quarter of an hour.
             physics: Physics { substeps: u32::MAX, ..Physics::default() },
             protocol: Protocol::default(),
             encoding: StimulusParams::default(),

@@ -1,4 +1,4 @@
-//! [`Simulations`]: what runs at the moment, and how it is told to change.
+//! [`Simulations`]: the running simulations and their controls.
 
 use crate::serve::catalogue::Who;
 use crate::serve::refusal::Refusal;
@@ -8,15 +8,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Most simulations at once.
+/// Maximum number of simulations at once.
 pub const MAX_SIMULATIONS: usize = 8;
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // What the locks guard is whole after every statement, even if a thread panicked.
+    // The locks guard data that are valid after every statement, even if a thread panicked.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What a simulation is to do now.
+/// The pending changes of a simulation.
 #[derive(Debug, Default)]
 struct Wishes {
     pace: Option<Pace>,
@@ -24,17 +24,17 @@ struct Wishes {
     seen: Option<Seen>,
 }
 
-/// The way to a simulation that runs in another thread.
+/// The control of a simulation in another thread.
 pub struct Control {
     /// The robot.
     pub who: Who,
     wishes: Mutex<Wishes>,
     changed: Condvar,
-    /// Whether it is to end: looked at in every substep.
+    /// True if the simulation should end; checked in every substep.
     pub(crate) over: AtomicBool,
 }
 
-/// What has been asked of a simulation since it last looked.
+/// The changes requested since the simulation last checked.
 #[derive(Debug, Default)]
 pub(crate) struct News {
     pub pace: Option<Pace>,
@@ -44,7 +44,7 @@ pub(crate) struct News {
 }
 
 impl Control {
-    /// Asks for a change.
+    /// Requests a change.
     pub fn change(&self, pace: Option<Pace>, paused: Option<bool>, seen: Option<Seen>) {
         let mut wishes = lock(&self.wishes);
         wishes.pace = pace.or(wishes.pace);
@@ -56,7 +56,7 @@ impl Control {
         self.changed.notify_all();
     }
 
-    /// Asks it to end, at once.
+    /// Requests an immediate end.
     pub fn end(&self) {
         let wishes = lock(&self.wishes);
         self.over.store(true, Ordering::Relaxed);
@@ -64,7 +64,7 @@ impl Control {
         self.changed.notify_all();
     }
 
-    /// Whether it was asked to.
+    /// Returns true if an end was requested.
     pub fn is_over(&self) -> bool {
         self.over.load(Ordering::Relaxed)
     }
@@ -79,7 +79,7 @@ impl Control {
         }
     }
 
-    /// Waits, but not if something is asked for.
+    /// Waits for up to `time`, or until a change is requested.
     pub(crate) fn wait(&self, time: Duration) {
         let idle = |wishes: &mut Wishes| {
             wishes.pace.is_none() && wishes.paused.is_none() && wishes.seen.is_none() && !self.is_over()
@@ -95,26 +95,26 @@ struct Running {
     closed: bool,
 }
 
-/// The simulations that run.
+/// The running simulations.
 #[derive(Default)]
 pub struct Simulations {
     running: Mutex<Running>,
 }
 
-/// A simulation's place among [`Simulations`], free again when this goes.
+/// A slot among [`Simulations`], freed on drop.
 pub struct Slot<'a> {
     simulations: &'a Simulations,
-    /// Its number.
+    /// The number of the simulation.
     pub id: u64,
-    /// The way to it.
+    /// The control of the simulation.
     pub control: Arc<Control>,
 }
 
 impl Simulations {
-    /// Takes a place.
+    /// Reserves a slot.
     ///
     /// # Errors
-    /// If all are taken.
+    /// Returns an error if all slots are taken.
     pub fn begin(&self, who: Who) -> Result<Slot<'_>, Refusal> {
         let mut running = lock(&self.running);
         if running.closed || running.simulations.len() >= MAX_SIMULATIONS {
@@ -134,26 +134,26 @@ impl Simulations {
         Ok(Slot { simulations: self, id, control })
     }
 
-    /// A simulation that runs.
+    /// Returns the control of a running simulation.
     ///
     /// # Errors
-    /// If there is none of that number (any more).
+    /// Returns an error if no simulation has that number (any more).
     pub fn simulation(&self, id: u64) -> Result<Arc<Control>, Refusal> {
         let found = lock(&self.running).simulations.get(&id).cloned();
         found.ok_or_else(|| Refusal::Unknown(format!("there is no simulation {id}; perhaps it has ended")))
     }
 
-    /// How many run.
+    /// Returns the number of running simulations.
     pub fn running(&self) -> usize {
         lock(&self.running).simulations.len()
     }
 
-    /// How many have been begun.
+    /// Returns the number of simulations begun so far.
     pub fn begun(&self) -> u64 {
         lock(&self.running).begun
     }
 
-    /// Ends all, and lets none begin.
+    /// Ends all simulations and prevents new ones.
     pub fn close(&self) {
         let mut running = lock(&self.running);
         running.closed = true;

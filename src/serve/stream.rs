@@ -1,7 +1,7 @@
-//! A simulation as server-sent events: JSON, positions as 16-bit numbers in base64.
+//! Encodes simulations as server-sent events: JSON, with positions as 16-bit numbers in base64.
 //!
-//! As in the page of a replay: steps of 1/200 voxel length from an origin per moment, near the
-//! centre of mass.
+//! As in the page of a replay, positions are in steps of 1/200 voxel length from an origin per
+//! moment, near the centre of mass.
 
 use crate::draw::html::{STEPS, corners, quantised};
 use crate::serve::catalogue::Who;
@@ -14,7 +14,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::{Value, json};
 
-/// An event as it goes over the line.
+/// Encodes an event.
 pub fn text(event: &Event) -> String {
     let (name, data) = match event {
         Event::Begin { id, plan, voxels, frame } => ("begin", begin(*id, plan, voxels, frame)),
@@ -22,7 +22,7 @@ pub fn text(event: &Event) -> String {
         Event::Moments { step, frames, answer } => {
             ("moments", json!({ "step": step, "frames": positions(frames), "answer": answer }))
         }
-        // A comment: nothing to do for the page.
+        // A comment: the page has nothing to do.
         Event::Still => return ":\n\n".to_string(),
         Event::End { step, answer, unstable } => {
             ("end", json!({ "step": step, "answer": answer, "unstable": unstable }))
@@ -31,7 +31,7 @@ pub fn text(event: &Event) -> String {
     format!("event: {name}\ndata: {data}\n\n")
 }
 
-/// A team's event as it goes over the line.
+/// Encodes a team's event.
 pub fn of_team(event: &TeamEvent) -> String {
     let (name, data) = match event {
         TeamEvent::Begin { id, plan, classes, stands } => {
@@ -86,8 +86,7 @@ fn looks(step: u32, until: u32, seen: &Seen) -> Value {
     json!({ "step": step, "until": until, "label": seen.label, "stimulus": seen.stimulus })
 }
 
-/// Moments: per moment the origin [x, y], two 64-bit floats, then two 16-bit numbers per point;
-/// little-endian.
+/// Encodes moments: the origin [x, y] as 64-bit floats, then 16-bit pairs per point; little-endian.
 fn positions(frames: &[Frame]) -> String {
     let mut bytes = Vec::new();
     for frame in frames {

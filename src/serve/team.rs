@@ -1,5 +1,4 @@
-//! A team: robots of several tasks see one picture at the same time, and their walks are counted while
-//! they walk.
+//! A team: robots of several tasks walk under one image at once, while their votes are counted.
 
 use crate::analysis::votes::{CLIP, Tally};
 use crate::serve::catalogue::{Catalogue, Collection, Who};
@@ -19,24 +18,24 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// Fewest robots that are a team.
+/// Minimum number of robots in a team.
 const LEAST: usize = 2;
 
-/// A robot of the team, by where it is found.
+/// The identity of a robot in the team.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Name {
-    /// Number of its collection.
+    /// The number of its collection.
     pub archive: usize,
-    /// Its id.
+    /// The id of the robot.
     pub robot: String,
-    /// Its task, as "4|9".
+    /// The task, such as "4|9".
     pub task: String,
-    /// What its walks say.
+    /// The judge of its walks.
     pub judge: Judge,
 }
 
-/// The team: of every task the fittest robot of the first archive that has one, all of the same data:
-/// those with most tasks. If the archives have fewer than two, the team that ships with the program.
+/// Returns the team: for every task, the fittest robot of the first archive that has one. All share
+/// the dataset with the most tasks. If there are fewer than two, returns the shipped team.
 pub fn members(collections: &[Arc<Collection>]) -> Vec<Name> {
     type Numbered<'a> = Vec<(usize, &'a Arc<Collection>)>;
     let (built_in, archives): (Numbered, Numbered) =
@@ -48,7 +47,7 @@ pub fn members(collections: &[Arc<Collection>]) -> Vec<Name> {
     }
 }
 
-/// The largest team among collections, each with its number.
+/// Returns the largest team among collections, each with its number.
 fn largest<'a>(collections: impl IntoIterator<Item = (usize, &'a Arc<Collection>)>) -> Vec<Name> {
     let data = |from: &Collection| (from.config.data.dataset.clone(), from.config.data.builtin.clone());
     let mut teams: Vec<(_, Vec<Name>)> = Vec::new();
@@ -72,44 +71,44 @@ fn largest<'a>(collections: impl IntoIterator<Item = (usize, &'a Arc<Collection>
     members
 }
 
-/// The classes that a team tells apart, in order.
+/// Returns the classes that a team tells apart, in order.
 pub fn classes<'a>(judges: impl IntoIterator<Item = &'a Judge>) -> Vec<u8> {
     let all: BTreeSet<u8> =
         judges.into_iter().flat_map(|judge| judge.left.iter().chain(&judge.right)).copied().collect();
     all.into_iter().collect()
 }
 
-/// A walk of the team to begin.
+/// A request to begin a team's walk.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TeamRequest {
-    /// What all of them see.
+    /// The image.
     #[serde(default)]
     shown: Shown,
-    /// For how many control steps; default: the first robot's protocol.
+    /// The number of control steps; the default is the first robot's protocol.
     control_steps: Option<u32>,
-    /// Times real time; 0: as fast as possible. Default 1.
+    /// The speed as a multiple of real time; 0: as fast as possible. Default 1.
     speed: Option<f64>,
 }
 
-/// A walk that can be begun.
+/// A valid plan for a team's walk.
 #[derive(Clone, Debug)]
 pub struct TeamPlan {
-    /// The robots, with what each sees; at least two.
+    /// The robots with their stimuli; at least two.
     pub members: Vec<(Name, Who, Seen)>,
-    /// What all of them see together.
+    /// The common stimulus that covers all windows.
     pub together: Seen,
-    /// For how many control steps.
+    /// The number of control steps.
     pub control_steps: u32,
-    /// How fast.
+    /// The pace.
     pub pace: Pace,
 }
 
 impl TeamRequest {
-    /// What it means.
+    /// Turns the request into a plan.
     ///
     /// # Errors
-    /// What is wrong with the request.
+    /// Returns an error if the request is invalid.
     pub fn plan(self, catalogue: &Catalogue, images: &ImageSets) -> Result<TeamPlan, Refusal> {
         let collections = catalogue.collections();
         let names = members(&collections);
@@ -131,49 +130,48 @@ impl TeamRequest {
     }
 }
 
-/// What a team's walk reports.
+/// An event of a team's walk.
 pub enum TeamEvent<'a> {
-    /// It begins, at rest.
+    /// The walk begins, at rest.
     Begin {
-        /// Its number.
+        /// The number of the walk.
         id: u64,
-        /// The robots, and what is shown for how long.
+        /// The robots, their image and the duration.
         plan: &'a TeamPlan,
-        /// The classes that are told apart.
+        /// The classes to tell apart.
         classes: &'a [u8],
-        /// Each robot's voxels, and how it stands.
+        /// Each robot's voxels and initial pose.
         stands: Vec<(Vec<VoxelCorners>, Frame)>,
     },
-    /// It went on.
+    /// The walk advanced.
     Moment {
-        /// Control steps done.
+        /// The control steps simulated.
         step: u32,
-        /// How each robot stands; none of one that has become unstable.
+        /// Each robot's pose; `None` for one that has become unstable.
         frames: Vec<Option<Frame>>,
-        /// What the walks come to so far.
+        /// The votes so far.
         tally: Tally,
     },
-    /// It stands still.
+    /// The walk is paused.
     Still,
-    /// It has ended.
+    /// The walk has ended.
     End {
-        /// Control steps done.
+        /// The control steps simulated.
         step: u32,
-        /// What the walks come to.
+        /// The final votes.
         tally: Tally,
     },
 }
 
-/// A robot that walks.
 struct Walker<'a> {
     rollout: Rollout<'a>,
     is_unstable: bool,
 }
 
-/// Lets a team walk, its robots at once in a pool; `tell` gets what happens.
+/// Runs a team's walk, its robots in parallel in a pool, and passes its events to `tell`.
 ///
 /// # Errors
-/// [`Gone`] as soon as `tell` says so.
+/// Returns [`Gone`] as soon as `tell` does.
 pub fn live(
     slot: &Slot,
     plan: &TeamPlan,
@@ -236,7 +234,7 @@ pub fn live(
     }
 }
 
-/// What the walks come to so far.
+/// Counts the votes so far.
 fn tally(walkers: &[Walker], judges: &[&Judge], classes: &[u8]) -> Tally {
     let moved = walkers.iter().map(|walker| (!walker.is_unstable).then(|| walker.rollout.moved())).collect();
     Tally::of(classes, judges, moved, (THRESHOLD, CLIP))

@@ -17,70 +17,69 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// What `audit.json` calls itself.
+/// The `format` of `audit.json`.
 pub const FORMAT: &str = "morphcog-audit";
-/// Version of its schema.
+/// The newest version of its schema.
 pub const FORMAT_VERSION: u32 = 1;
 
 /// The content of `audit.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AuditFile {
-    /// "morphcog-audit".
+    /// The constant "morphcog-audit".
     #[schemars(extend("const" = FORMAT))]
     pub format: String,
-    /// Version of this schema.
+    /// The version of this schema.
     #[schemars(range(min = 1, max = FORMAT_VERSION))]
     pub format_version: u32,
-    /// Version of morphcog that wrote it.
+    /// The version of morphcog that wrote the file.
     pub program_version: String,
-    /// Name of the run the robots are from.
+    /// The name of the audited run.
     pub run: String,
-    /// SHA-256 of that run's content: verdicts on another state of it are stale.
+    /// The SHA-256 of that run's content: verdicts on another state of it are stale.
     pub run_sha256: String,
-    /// Robots in that run.
+    /// The number of robots in that run.
     pub elites: usize,
-    /// By what was judged.
+    /// The criteria of the verdicts.
     pub criteria: Criteria,
     /// The robots audited so far, in the order of the run.
     pub robots: Vec<RobotAudit>,
 }
 
-/// What an audit found of one robot.
+/// The audit of one robot.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RobotAudit {
-    /// Its id.
+    /// The id of the robot.
     pub id: String,
-    /// Its task.
+    /// The task of the robot.
     pub task: String,
     /// The verdict.
     pub verdict: Verdict,
-    /// Why: for `exploits`, what it exploits.
+    /// The reason: for `exploits`, what the robot exploits.
     pub reason: String,
-    /// Share of the perturbed rollouts in which its behaviour persists.
+    /// The share of the perturbed rollouts in which its behaviour persists.
     #[serde(deserialize_with = "ranges::share")]
     pub persisting: f64,
-    /// Root mean square difference of displacements from the unchanged rollout's, voxel lengths.
+    /// The root mean square change of displacements from the unchanged rollout, voxel lengths.
     #[serde(deserialize_with = "ranges::size")]
     pub spread: f64,
-    /// Energies put in per actuation cycle in the unchanged rollout \[mass·wu²/s²\].
+    /// The energies put in per actuation cycle in the unchanged rollout \[mass·wu²/s²\].
     pub energy_per_cycle: Energy,
-    /// Displacement under each training image in the unchanged rollout, voxel lengths; none if
-    /// unstable.
+    /// The displacements under the training images, unchanged, voxel lengths; null if unstable.
     #[serde(default, deserialize_with = "ranges::number")]
     pub displacements: Option<Vec<f64>>,
-    /// The perturbed rollouts; none for one that is not a walker.
+    /// The perturbed rollouts; empty for a robot that is not a walker.
     pub rollouts: Vec<PerturbedRollout>,
 }
 
 impl RobotAudit {
-    /// Whether the verdict is physical.
+    /// Returns true if the verdict is physical.
     pub fn is_physical(&self) -> bool {
         self.verdict == Verdict::Physical
     }
 
-    /// Verdict and reason in one: "exploits: time step".
+    /// Joins verdict and reason: "exploits: time step".
     pub fn conclusion(&self) -> String {
         match self.verdict {
             Verdict::Physical => self.verdict.name().to_string(),
@@ -121,7 +120,7 @@ impl Stored for AuditFile {
 }
 
 impl AuditFile {
-    /// Without robots as yet.
+    /// Creates a file without robots.
     pub fn new(run: &str, run_sha256: String, elites: usize, criteria: &Criteria) -> Self {
         AuditFile {
             format: FORMAT.to_string(),
@@ -138,38 +137,38 @@ impl AuditFile {
     /// Reads `audit.json`.
     ///
     /// # Errors
-    /// What is wrong with the file, with its line and key.
+    /// Returns an error, with its line and key, if the file is missing or invalid.
     pub fn read(path: &Path) -> Result<Self, Error> {
         results::read(path, Some("audit"))
     }
 
-    /// Reads its text; `name` stands in messages.
+    /// Parses the text of the file; `name` appears in messages.
     ///
     /// # Errors
-    /// If it is no verdicts.
+    /// Returns an error if the text holds no valid verdicts.
     pub fn parse(text: &str, name: &str) -> Result<Self, Error> {
         results::parse(text, name)
     }
 
-    /// Where the verdicts on a run are: beside its `run.json`; of a named run in the present folder,
-    /// if there are any.
+    /// Returns the path of the verdicts on a run: beside its `run.json`, or for a shipped run in
+    /// the current folder, if there are any.
     pub fn path(run_json: &Path) -> PathBuf {
         let made = folder::beside(run_json, AUDIT_JSON);
         if exists(&made) { made } else { run_json.with_file_name(AUDIT_JSON) }
     }
 
-    /// The verdicts on a run, from the file of [`path`](AuditFile::path).
+    /// Reads the verdicts on a run from [`path`](AuditFile::path).
     ///
     /// # Errors
-    /// If there is none, it is broken, or it is about another state of the run.
+    /// Returns an error if there are none, or they are invalid or about another state of the run.
     pub fn of_run(run: &RunFile, run_json: &Path) -> Result<Self, Error> {
         AuditFile::of_state(&run.fingerprint(), run_json)
     }
 
-    /// The same of a run with this fingerprint.
+    /// Reads the verdicts on the run with this fingerprint.
     ///
     /// # Errors
-    /// As of [`of_run`](AuditFile::of_run).
+    /// Returns the errors of [`of_run`](AuditFile::of_run).
     pub(crate) fn of_state(fingerprint: &str, run_json: &Path) -> Result<Self, Error> {
         let path = &AuditFile::path(run_json);
         let audit = Invocation::new("audit").option("archive", folder::archive(run_json));
@@ -179,7 +178,7 @@ impl AuditFile {
             return Err(Error::input(text).remedy(Remedy::Run(audit, "audits them")));
         }
         let file = AuditFile::read(path)?;
-        // What ships with a named run knows more than an audit here that was stopped.
+        // Verdicts that ship with the run are more complete than an audit that was stopped here.
         let shipped = run_json.with_file_name(AUDIT_JSON);
         if *path != shipped
             && let Ok(known) = AuditFile::read(&shipped)
@@ -200,10 +199,10 @@ impl AuditFile {
         Ok(file)
     }
 
-    /// The verdicts on a run; none if it has not been audited.
+    /// Reads the verdicts on a run, or returns `None` if it has not been audited.
     ///
     /// # Errors
-    /// If they are broken, or about another state of the run.
+    /// Returns an error if they are invalid, or about another state of the run.
     pub fn if_any(run: &RunFile, run_json: &Path) -> Result<Option<Self>, Error> {
         match exists(&AuditFile::path(run_json)) {
             true => AuditFile::of_run(run, run_json).map(Some),
@@ -211,10 +210,10 @@ impl AuditFile {
         }
     }
 
-    /// The verdicts on a run with this fingerprint, from an audit in a folder or in a folder in it.
+    /// Reads the verdicts on the run with this fingerprint, from a folder or its subfolders.
     ///
     /// # Errors
-    /// If there is none, or it is broken.
+    /// Returns an error if there are none, or they are invalid.
     pub fn near(folder: &Path, run_sha256: &str) -> Result<Self, Error> {
         let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
         let mut folders: Vec<PathBuf> =
@@ -236,8 +235,7 @@ impl AuditFile {
         Err(Error::input(text).remedy(Remedy::Run(audit, "makes one beside the run")))
     }
 
-    /// Adds what a file of verdicts on the same run, by the same criteria and version, says of
-    /// other robots.
+    /// Adds verdicts on other robots from a file about the same run, criteria and version.
     pub(crate) fn add_known(&mut self, path: &Path) {
         let Ok(known) = AuditFile::read(path) else { return };
         let head = |file: &AuditFile| AuditFile { robots: Vec::new(), ..file.clone() };
@@ -248,18 +246,18 @@ impl AuditFile {
         }
     }
 
-    /// What was found of a robot.
+    /// Returns the audit of a robot.
     pub fn robot(&self, id: &str) -> Option<&RobotAudit> {
         self.robots.iter().find(|robot| robot.id == id)
     }
 
-    /// Its text: the head on one line, then one line per robot.
+    /// Encodes the file as JSON: the head on one line, then one line per robot.
     pub fn to_json(&self) -> String {
         let head = AuditFile { robots: Vec::new(), ..self.clone() };
         by_lines(&head, &self.robots)
     }
 
-    /// `audit.csv`: a line per robot and rollout, the unchanged one first.
+    /// Encodes `audit.csv`: a line per robot and rollout, the unchanged one first.
     pub fn to_csv(&self) -> Vec<u8> {
         let images = self.robots.iter().filter_map(|r| r.displacements.as_ref()).map(Vec::len).max();
         let images = images.unwrap_or(0);
@@ -292,33 +290,32 @@ impl AuditFile {
         table::csv(columns, rows)
     }
 
-    /// Writes it, and its CSV beside it.
+    /// Writes the file, and its CSV beside it.
     ///
     /// # Errors
-    /// If they cannot be written.
+    /// Returns an error if a file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
         write_with_table(path, &self.to_json(), &self.to_csv(), [])
     }
 }
 
-/// What an audit finds.
+/// The verdict of an audit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// Its directions survive every change.
+    /// The robot's directions survive every change.
     Physical,
-    /// Small changes of the world break it.
+    /// Small changes of the world break its behaviour.
     Fragile,
-    /// It survives changes of the world, but not of how that is computed or how images are shown:
-    /// it exploits those.
+    /// It survives changes of the world, but not changes of the computation or of the way images
+    /// are presented: it exploits those.
     Exploits,
-    /// It does not answer its training images, or no better than a robot that always walks the same
-    /// way.
+    /// It does not answer its training images, or no better than always walking the same way.
     NotAWalker,
 }
 
 impl Verdict {
-    /// For people.
+    /// Returns the verdict in words.
     pub fn name(self) -> &'static str {
         match self {
             Verdict::Physical => "physical",
@@ -329,25 +326,25 @@ impl Verdict {
     }
 }
 
-/// A perturbed rollout.
+/// A rollout with one change.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PerturbedRollout {
-    /// What was changed, and how much.
+    /// The change and its size.
     pub name: String,
-    /// What was changed.
+    /// The kind of the change.
     pub kind: Kind,
-    /// Displacement under each training image, voxel lengths (a mirrored rollout's mirrored back);
-    /// none if unstable.
+    /// The displacement under each training image, voxel lengths (mirrored back if the rollout is
+    /// mirrored); null if unstable.
     #[serde(default, deserialize_with = "ranges::number")]
     pub displacements: Option<Vec<f64>>,
-    /// Share of the images answered correctly in the unchanged rollout for which it still walks the
-    /// correct way.
+    /// The share of the images answered correctly in the unchanged rollout for which the robot
+    /// still walks the correct way.
     #[serde(deserialize_with = "ranges::share")]
     pub kept: f64,
-    /// Walks under them, in the correct direction, as a share of the unchanged rollout's.
+    /// The walks in the correct direction under these images, relative to the unchanged rollout.
     #[serde(deserialize_with = "ranges::number")]
     pub distance: f64,
-    /// Whether the behaviour persists.
+    /// True if the behaviour persists.
     pub persists: bool,
 }

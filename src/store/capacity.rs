@@ -1,4 +1,4 @@
-//! `capacity.json`: what networks the robots are worth (paper, "Morphological cognition capacity").
+//! `capacity.json`: the networks that match the robots (paper, "Morphological cognition capacity").
 
 use crate::base::error::Error;
 use crate::base::ranges;
@@ -11,46 +11,45 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// What `capacity.json` calls itself.
+/// The `format` of `capacity.json`.
 pub const FORMAT: &str = "morphcog-capacity";
-/// Version of its schema.
+/// The newest version of its schema.
 pub const FORMAT_VERSION: u32 = 1;
 
 /// The content of `capacity.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CapacityFile {
-    /// "morphcog-capacity".
+    /// The constant "morphcog-capacity".
     #[schemars(extend("const" = FORMAT))]
     pub format: String,
-    /// Version of this schema.
+    /// The version of this schema.
     #[schemars(range(min = 1, max = FORMAT_VERSION))]
     pub format_version: u32,
-    /// Version of morphcog that wrote it.
+    /// The version of morphcog that wrote the file.
     pub program_version: String,
-    /// Name of the evaluated run, or of the runs.
+    /// The name of the evaluated run, or names of the runs.
     pub run: String,
-    /// Names the evaluation: runs, images, robots and how these walked.
+    /// The identifier of the evaluation: its runs, images, robots and their walks.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub eval_sha256: Option<String>,
-    /// How the robots were selected, for people.
+    /// The selection of the robots, in words.
     pub selected: String,
-    /// Name of the dataset.
+    /// The name of the dataset.
     pub dataset: String,
-    /// What training waited on: "test" as in the paper, or "validation".
+    /// The images that stop a training: "test" as in the paper, or "validation".
     pub patience_on: String,
-    /// Trainings from scratch per size.
+    /// The number of trainings from scratch per size.
     pub trainings: usize,
-    /// Whether only those of the robots count that an audit found physical.
+    /// True if only robots count that an audit found physical.
     #[serde(default, skip_serializing_if = "is_false")]
     pub physical_only: bool,
-    /// Whether a signal stopped it before the end.
+    /// True if a signal stopped the analysis before the end.
     pub stopped: bool,
     /// The tasks.
     pub tasks: Vec<TaskCapacity>,
 }
 
-/// What a file needs not say.
 fn is_false(value: &bool) -> bool {
     !value
 }
@@ -59,46 +58,46 @@ fn is_false(value: &bool) -> bool {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TaskCapacity {
-    /// Its name, as "0|1".
+    /// The name of the task, such as "0|1".
     pub task: String,
-    /// Robots evaluated.
+    /// The number of robots evaluated.
     pub robots: usize,
-    /// Their mean accuracy on test images, 0 to 1.
+    /// The mean accuracy of the robots on test images, 0 to 1.
     #[serde(deserialize_with = "ranges::share")]
     pub accuracy: f64,
     /// A curve per kind of network.
     pub curves: Vec<Curve>,
 }
 
-/// Accuracy over size for one kind of network.
+/// The accuracy of one kind of network over its size.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Curve {
-    /// "mlp" (size: hidden neurons) or "cnn" (size: kernels).
+    /// The kind: "mlp" (size: hidden neurons) or "cnn" (size: kernels).
     pub network: String,
     /// The points, by size.
     pub points: Vec<Point>,
-    /// c0, c1, c2 of accuracy ≈ c0 + c1·size + c2·size², least squares through the points.
+    /// The coefficients c0, c1, c2 of accuracy ≈ c0 + c1·size + c2·size², least squares.
     #[serde(default, deserialize_with = "ranges::number")]
     pub fit: Option<[f64; 3]>,
-    /// The smallest size at which the fit reaches the robots' accuracy, or that it is above it from
-    /// the smallest network on; none if it never reaches it.
+    /// The smallest size at which the fit reaches the robots' accuracy, or a note that the smallest
+    /// network already exceeds it; null if the fit never reaches it.
     pub capacity: Option<Crossing>,
 }
 
-/// One size of network.
+/// Networks of one size.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Point {
-    /// Hidden neurons, or kernels.
+    /// The number of hidden neurons, or of kernels.
     pub size: usize,
-    /// Mean test accuracy over the trainings, 0 to 1.
+    /// The mean test accuracy over the trainings, 0 to 1.
     #[serde(deserialize_with = "ranges::share")]
     pub mean: f64,
-    /// Standard deviation over the trainings; none of one.
+    /// The standard deviation over the trainings; null for a single one.
     #[serde(default, deserialize_with = "ranges::share")]
     pub standard_deviation: Option<f64>,
-    /// Trainable parameters.
+    /// The number of trainable parameters.
     pub parameters: usize,
 }
 
@@ -142,26 +141,25 @@ impl CapacityFile {
     /// Reads `capacity.json`.
     ///
     /// # Errors
-    /// What is wrong with the file, with its line and key.
+    /// Returns an error, with its line and key, if the file is missing or invalid.
     pub fn read(path: &Path) -> Result<Self, Error> {
         results::read(path, Some("capacity"))
     }
 
-    /// Where the analysis of an evaluation goes if nothing is said: `capacity.json` beside it, or
+    /// Returns the default path for the analysis of an evaluation: `capacity.json` beside it, or
     /// `gallery-zero_one-capacity.json` beside `gallery-zero_one-eval.json`.
     pub fn beside(eval: &Path) -> PathBuf {
         let of = eval.file_name().and_then(|name| name.to_str()?.strip_suffix(EVAL_JSON));
         eval.with_file_name(format!("{}{CAPACITY_JSON}", of.unwrap_or_default()))
     }
 
-    /// The analysis beside an `eval.json`, if there is one of just the robots and images that the
-    /// evaluation is of.
+    /// Reads the analysis beside an `eval.json`, if it has the same robots and images.
     pub fn of(report: &EvalFile, eval: &Path) -> Option<Self> {
         let found = Self::read(&Self::beside(eval)).ok()?;
         found.is_of(report).then_some(found)
     }
 
-    /// Whether it is of just the robots and images that an evaluation is of.
+    /// Returns true if the analysis has the same robots and images as an evaluation.
     pub fn is_of(&self, report: &EvalFile) -> bool {
         let same = |task: &TaskCapacity| {
             report.means.get(&task.task).is_some_and(|mean| {
@@ -174,7 +172,7 @@ impl CapacityFile {
         self.dataset == report.dataset && self.selected == report.selected && self.tasks.iter().all(same)
     }
 
-    /// `capacity.csv`: a line per task, network and size.
+    /// Encodes `capacity.csv`: a line per task, network and size.
     pub fn to_csv(&self) -> Vec<u8> {
         let columns =
             ["task", "network", "size", "parameters", "mean", "standard_deviation", "fit", "robots"];
@@ -190,22 +188,22 @@ impl CapacityFile {
         table::csv(columns, rows)
     }
 
-    /// Its text.
+    /// Encodes the file as JSON.
     pub fn to_json(&self) -> String {
-        // Numbers are finite, keys are text: JSON has all of it.
+        // Numbers are finite and keys are text, so encoding cannot fail.
         serde_json::to_string_pretty(self).expect("JSON has all of it") + "\n"
     }
 }
 
 impl TaskCapacity {
-    /// The capacity as one kind of network tells it, if that was trained; none within: no match.
+    /// Returns the capacity for a kind of trained network; the inner `None` means no match.
     pub fn size_of(&self, network: &str) -> Option<Option<Crossing>> {
         self.curves.iter().find(|curve| curve.network == network).map(|curve| curve.capacity)
     }
 }
 
 impl Curve {
-    /// The fit at a size.
+    /// Returns the fit at a size.
     pub fn value(&self, size: f64) -> Option<f64> {
         self.fit.map(|[c0, c1, c2]| c0 + size * (c1 + size * c2))
     }

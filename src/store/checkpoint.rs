@@ -1,5 +1,4 @@
-//! Checkpoints: everything a run needs to go on, written so that one good checkpoint always
-//! survives.
+//! Checkpoints hold everything a run needs to continue; one valid checkpoint always survives.
 
 use crate::base::error::Error;
 use crate::base::files::{read_bytes, sync_folder, write_atomically};
@@ -15,20 +14,20 @@ use std::collections::BTreeSet;
 use std::io::ErrorKind;
 use std::path::Path;
 
-/// What a run must remember besides `run.json`.
+/// The state that a run needs besides `run.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {
-    /// The run as `run.json` would have it.
+    /// The run as in `run.json`.
     pub run: RunFile,
-    /// Counts so far.
+    /// The counts so far.
     pub totals: Totals,
-    /// Bodies evaluated so far.
+    /// The bodies evaluated so far.
     pub known_bodies: KnownBodies,
 }
 
 impl Checkpoint {
-    /// As strict as a `run.json` is read: what goes on from here becomes one.
+    /// Checks as strictly as when reading a `run.json`, because the run continues from here.
     fn check(&self) -> Result<(), Error> {
         self.run.check().map_err(|error| error.in_place("run"))?;
         let RunFile { config, elites, .. } = &self.run;
@@ -42,18 +41,18 @@ impl Checkpoint {
     }
 }
 
-/// Content keys of bodies. In files one text of 32 hexadecimal digits each, in ascending order.
+/// The content keys of bodies; in files, 32 hexadecimal digits per key, in ascending order.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct KnownBodies(BTreeSet<[u8; 16]>);
 
 impl KnownBodies {
-    /// Adds a body's key; whether it is new.
+    /// Adds a body's key; returns true if it is new.
     pub fn insert(&mut self, key: [u8; 16]) -> bool {
         self.0.insert(key)
     }
 
-    /// Forgets a body's key.
+    /// Removes a body's key.
     pub fn remove(&mut self, key: &[u8; 16]) {
         self.0.remove(key);
     }
@@ -77,10 +76,10 @@ impl TryFrom<String> for KnownBodies {
     }
 }
 
-/// Writes a checkpoint; the one before is kept. The first line is the checksum of the second.
+/// Writes a checkpoint and keeps the previous one. The first line is the checksum of the second.
 ///
 /// # Errors
-/// If it cannot be written; the good one before stays, perhaps under the name of the previous one.
+/// Returns an error if it cannot be written; the previous one survives, perhaps under its new name.
 pub fn write(folder: &Path, checkpoint: &Checkpoint) -> Result<(), Error> {
     let [newest, previous] = CHECKPOINTS.map(|name| folder.join(name));
     let failed = |path: &Path| {
@@ -89,8 +88,7 @@ pub fn write(folder: &Path, checkpoint: &Checkpoint) -> Result<(), Error> {
     };
     let text = serde_json::to_string(checkpoint).map_err(|error| Error::other(error.to_string()))?;
     let text = format!("{}\n{text}\n", sha256_hex(text.as_bytes()));
-    // Only a good newest becomes the previous one: a broken one must not push the last good one
-    // out.
+    // Only a valid newest checkpoint becomes the previous one: a damaged one must not replace it.
     if let Ok(Some(_)) = content(&newest) {
         ownership::check(&newest).map_err(failed(&newest))?;
         std::fs::rename(&newest, &previous).map_err(failed(&previous))?;
@@ -99,11 +97,11 @@ pub fn write(folder: &Path, checkpoint: &Checkpoint) -> Result<(), Error> {
     write_atomically(&newest, text.as_bytes()).map_err(failed(&newest))
 }
 
-/// Reads the newest good checkpoint; `None` if there never was one. A broken newest one is passed
-/// over, and said with `warn`.
+/// Reads the newest valid checkpoint, or returns `None` if there never was one. It skips a damaged
+/// newest one and reports it with `warn`.
 ///
 /// # Errors
-/// If there are only broken ones.
+/// Returns an error if all checkpoints are damaged.
 pub fn read(folder: &Path, mut warn: impl FnMut(String)) -> Result<Option<Checkpoint>, Error> {
     let [newest, previous] = CHECKPOINTS.map(|name| folder.join(name));
     let first = match read_one(&newest) {
@@ -121,11 +119,11 @@ pub fn read(folder: &Path, mut warn: impl FnMut(String)) -> Result<Option<Checkp
     }
 }
 
-/// Puts the checkpoint before into the place of a broken newest one, which would push it out when
-/// the next is written.
+/// Replaces a damaged newest checkpoint with the previous one, which the next write would otherwise
+/// discard.
 ///
 /// # Errors
-/// If it cannot be renamed.
+/// Returns an error if it cannot be renamed.
 pub(crate) fn take_back(folder: &Path) -> Result<(), Error> {
     let [newest, previous] = CHECKPOINTS.map(|name| folder.join(name));
     let renamed = ownership::check(&newest)
@@ -137,13 +135,13 @@ pub(crate) fn take_back(folder: &Path) -> Result<(), Error> {
 fn read_one(path: &Path) -> Result<Option<Checkpoint>, Error> {
     let Some(content) = content(path)? else { return Ok(None) };
     let name = path.display().to_string();
-    // The checksum is the second line's, the text the file's second.
+    // The checksum covers the second line, which holds the text.
     let checkpoint: Checkpoint = reading::read_json(&content, &name)?;
     checkpoint.check().map_err(|error| error.in_place(&name))?;
     Ok(Some(checkpoint))
 }
 
-/// What a checkpoint file holds, if its checksum is right; `None` if there is no such file.
+/// Returns the content of a checkpoint file if its checksum is right, or `None` without a file.
 fn content(path: &Path) -> Result<Option<String>, Error> {
     let text = match read_bytes(path) {
         Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
@@ -181,7 +179,7 @@ mod tests {
         }
     }
 
-    /// What is read, and whether there was a warning.
+    /// Reads a checkpoint and whether there was a warning.
     fn read_quietly(folder: &Path) -> (Option<Checkpoint>, bool) {
         let mut warned = false;
         let found = read(folder, |text| warned = text.contains("checkpoint.json")).unwrap();
@@ -216,7 +214,7 @@ mod tests {
             std::fs::write(&newest, &whole[..at]).unwrap();
             assert_eq!(read_quietly(folder), (Some(after(1)), true), "cut at {at}");
         }
-        // Two bad writes in a row.
+        // Two failed writes in a row.
         write(folder, &after(3)).unwrap();
         assert_eq!(read_one(&folder.join(CHECKPOINTS[1])).unwrap(), Some(after(1)));
         std::fs::write(&newest, b"").unwrap();
@@ -243,7 +241,7 @@ mod tests {
             write(folder, &wrong).unwrap();
             let error = read_one(&folder.join(CHECKPOINTS[0])).unwrap_err();
             assert!(error.message.contains(CHECKPOINTS[0]) && error.message.contains(word), "{error}");
-            // The one before, which is good, is gone on from.
+            // Continues from the previous checkpoint, which is valid.
             assert_eq!(read_quietly(folder), (Some(after(1)), true), "{word}");
             std::fs::remove_file(folder.join(CHECKPOINTS[1])).unwrap();
             write(folder, &after(1)).unwrap();
@@ -257,7 +255,7 @@ mod tests {
         let folder = folder.path();
         write(folder, &after(1)).unwrap();
         std::fs::rename(folder.join(CHECKPOINTS[0]), folder.join(CHECKPOINTS[1])).unwrap();
-        // A folder is in the way of the newest.
+        // A folder blocks the newest.
         std::fs::create_dir(folder.join(CHECKPOINTS[0])).unwrap();
         assert!(write(folder, &after(2)).is_err());
         assert_eq!(read_one(&folder.join(CHECKPOINTS[1])).unwrap(), Some(after(1)));

@@ -1,4 +1,4 @@
-//! `eval.json` and `eval.csv`: what an evaluation found.
+//! `eval.json` and `eval.csv`: the results of an evaluation.
 
 use crate::base::error::Error;
 use crate::base::hash;
@@ -24,154 +24,154 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::mem::replace;
 use std::path::Path;
 
-/// What `eval.json` calls itself.
+/// The `format` of `eval.json`.
 pub const FORMAT: &str = "morphcog-eval";
-/// Version of its schema.
+/// The newest version of its schema.
 pub const FORMAT_VERSION: u32 = 1;
 
-/// How far a share may be from its quotient: programs of others round it.
+/// The tolerance of a share against its quotient: other programs round shares.
 const ROUNDING: f64 = 1e-6;
 
 /// The content of `eval.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EvalFile {
-    /// "morphcog-eval".
+    /// The constant "morphcog-eval".
     #[schemars(extend("const" = FORMAT))]
     pub format: String,
-    /// Version of this schema.
+    /// The version of this schema.
     #[schemars(range(min = 1, max = FORMAT_VERSION))]
     pub format_version: u32,
-    /// Version of morphcog that wrote it.
+    /// The version of morphcog that wrote the file.
     pub program_version: String,
-    /// Name of the (first) run the robots are from.
+    /// The name of the (first) run of the robots.
     pub run: String,
-    /// Seed of that run.
+    /// The seed of that run.
     pub run_seed: u64,
-    /// All runs the robots are from.
+    /// All runs of the robots.
     #[serde(default)]
     pub runs: Vec<RunRef>,
-    /// What robots were shown; if they look at different windows of it, what all of them see.
+    /// The task, data and stimulus; if robots use different windows, those of the common part.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub setting: Option<Setting>,
-    /// How the robots were selected.
+    /// The selection of the robots, in words.
     pub selected: String,
-    /// Name of the dataset.
+    /// The name of the dataset.
     pub dataset: String,
-    /// SHA-256 of its test split, if images of that were shown.
+    /// The SHA-256 of its test split, if those images were used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub test_sha256: Option<String>,
-    /// What the robots were trained on, if that is another dataset.
+    /// The robots' training data, if that is another dataset.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trained_on: Option<DatasetRef>,
-    /// Which images: those of the test split, or validation images.
+    /// The split of the images: test, or validation.
     #[serde(default, skip_serializing_if = "HeldOut::is_default")]
     pub split: HeldOut,
-    /// Seed of what was drawn.
+    /// The seed of all random draws.
     pub seed: u64,
-    /// Control steps per image, each a fresh rollout.
+    /// The number of control steps per image, each a fresh rollout.
     pub control_steps: u32,
-    /// Displacements up to this counted as wrong \[voxel lengths\].
+    /// The displacement up to which an answer counts as wrong \[voxel lengths\].
     #[serde(deserialize_with = "ranges::size")]
     pub threshold: f64,
-    /// Whether it ended before the last robot, by a signal or otherwise.
+    /// True if the evaluation ended before the last robot, by a signal or otherwise.
     pub stopped: bool,
     /// The images.
     pub images: Vec<ImageRef>,
-    /// By task: what takes no body at all.
+    /// The baselines without bodies, by task.
     pub baselines: BTreeMap<String, Baselines>,
-    /// By task: averages over its robots.
+    /// The averages over the robots, by task.
     pub means: BTreeMap<String, Mean>,
     /// The robots, in the order of their selection.
     pub robots: Vec<RobotReport>,
 }
 
-/// Accuracies on the same images that take no body.
+/// Accuracies without a body on the same images.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Baselines {
-    /// Always answering the larger group.
+    /// The accuracy of always answering the larger group.
     #[serde(deserialize_with = "ranges::share")]
     pub larger_group: f64,
-    /// One pixel and a threshold, chosen on training images.
+    /// The accuracy of one pixel and a threshold, chosen on training images.
     #[serde(deserialize_with = "ranges::share")]
     pub best_single_pixel: f64,
     /// That pixel: row, column.
     pub pixel: [usize; 2],
-    /// The group of the nearest of the run's training images; none if those are of another dataset.
+    /// The accuracy of the nearest of the run's training images; absent for another dataset.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "ranges::share")]
     pub nearest_training_image: Option<f64>,
 }
 
-/// Averages over the robots of a task.
+/// The averages over the robots of a task.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Mean {
-    /// Robots.
+    /// The number of robots.
     pub robots: usize,
-    /// Mean accuracy.
+    /// The mean accuracy.
     #[serde(deserialize_with = "ranges::share")]
     pub accuracy: f64,
-    /// Mean balanced accuracy.
+    /// The mean balanced accuracy.
     #[serde(deserialize_with = "ranges::share")]
     pub balanced_accuracy: f64,
-    /// Standard deviation of the accuracy over the robots; none of a single one.
+    /// The standard deviation of the accuracy over the robots; absent for a single one.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "ranges::share")]
     pub standard_deviation: Option<f64>,
-    /// 95 % bootstrap interval of the mean accuracy (percentiles of 10,000 resamples; of
-    /// several runs, of the runs and then of the robots of each).
+    /// The 95 % bootstrap interval of the mean accuracy: percentiles of 10,000 resamples. With
+    /// several runs, it resamples runs and then the robots of each.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "ranges::interval")]
     pub interval: Option<[f64; 2]>,
 }
 
-/// What one robot did.
+/// The results of one robot.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RobotReport {
-    /// Its id.
+    /// The id of the robot.
     pub id: String,
-    /// Its run, by its place in `runs`.
+    /// The index of its run in `runs`.
     #[serde(default)]
     pub run: usize,
-    /// Its task.
+    /// The task of the robot.
     pub task: String,
-    /// Its fitness on the training images, voxel lengths.
+    /// The fitness on the training images, voxel lengths.
     #[serde(deserialize_with = "ranges::number")]
     pub objective: f64,
-    /// Which way the classes before the task's bar are to walk: "left" or "right", as on the
-    /// training images.
+    /// The direction of the classes before the task's bar on the training images: "left" or
+    /// "right".
     pub first_group_walks: String,
-    /// Images answered correctly.
+    /// The number of images answered correctly.
     pub right: usize,
-    /// Images in all.
+    /// The number of images.
     pub images: usize,
-    /// Share answered correctly.
+    /// The share of images answered correctly.
     #[serde(deserialize_with = "ranges::share")]
     pub accuracy: f64,
-    /// Its 95 % Wilson interval.
+    /// The 95 % Wilson interval of the accuracy.
     #[serde(deserialize_with = "ranges::interval")]
     pub interval: [f64; 2],
-    /// Mean over the two groups of the share answered correctly.
+    /// The mean over the two groups of the share answered correctly.
     #[serde(deserialize_with = "ranges::share")]
     pub balanced_accuracy: f64,
-    /// Share answered correctly, by class.
+    /// The share answered correctly, by class.
     #[serde(deserialize_with = "ranges::share")]
     pub per_class: BTreeMap<u8, f64>,
-    /// Mean |displacement|, voxel lengths, of the stable rollouts.
+    /// The mean |displacement| of the stable rollouts, voxel lengths.
     #[serde(deserialize_with = "ranges::size")]
     pub mean_distance: f64,
-    /// Share of images under which it moved no farther than the threshold.
+    /// The share of images under which it moved no farther than the threshold.
     #[serde(deserialize_with = "ranges::share")]
     pub not_moved: f64,
-    /// Images under which its rollout became unstable (counted as wrong).
+    /// The number of images under which its rollout became unstable (counted as wrong).
     pub unstable: usize,
-    /// Rollouts simulated.
+    /// The number of rollouts simulated.
     pub simulated: usize,
-    /// How it did on the validation images, if it was selected on them.
+    /// The results on the validation images, if they selected the robot.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub validation: Option<Validated>,
-    /// Displacement under each image, voxel lengths; none if unstable.
+    /// The displacement under each image, voxel lengths; null if unstable.
     #[serde(deserialize_with = "ranges::number")]
     pub displacements: Vec<Option<f64>>,
 }
 
-/// One robot's test.
+/// The evaluation of one robot on images.
 pub(crate) struct Trial<'a> {
     pub run: &'a RunFile,
     pub robot: &'a Robot,
@@ -224,7 +224,7 @@ impl RobotReport {
 }
 
 impl RobotReport {
-    /// The report in short: its figures.
+    /// Returns the report without displacements.
     pub fn without_displacements(&self) -> Self {
         RobotReport { displacements: Vec::new(), ..self.clone() }
     }
@@ -283,7 +283,7 @@ impl Stored for EvalFile {
 }
 
 impl EvalFile {
-    /// Names what was shown to which robots, and what they did.
+    /// Returns a hash of the runs, the images, the robots and their walks.
     pub(crate) fn fingerprint(&self) -> String {
         let runs: Vec<&String> = self.runs.iter().map(|run| &run.sha256).collect();
         let walked =
@@ -292,7 +292,7 @@ impl EvalFile {
         sha256_hex(serde_json::to_string(&all).expect("texts, numbers and lists are JSON").as_bytes())
     }
 
-    /// Of robots of these runs; together they see images and have tasks as a config says.
+    /// Creates the evaluation of these runs' robots; `together` has their common images and tasks.
     pub(crate) fn new(
         (sources, together): (&[StoredRun], &Config),
         (selected, split, seed, threshold): (String, HeldOut, u64, f64),
@@ -329,7 +329,7 @@ impl EvalFile {
         }
     }
 
-    /// Says that the images are of another dataset than that the robots were trained on.
+    /// Records that the images are of another dataset than the robots' training data.
     pub(crate) fn transfer(&mut self, name: &str, dataset: &Dataset) {
         self.dataset = name.to_string();
         if let Some(setting) = &mut self.setting {
@@ -342,7 +342,7 @@ impl EvalFile {
         }
     }
 
-    /// All of it but what was found.
+    /// Returns the file without results.
     pub(crate) fn head(&self) -> Self {
         EvalFile {
             stopped: false,
@@ -374,8 +374,8 @@ impl EvalFile {
         self.means = means.collect();
     }
 
-    /// How the robots were selected, for people; if they were trained on another dataset, or a
-    /// signal came before the last of them, that, too.
+    /// Describes the selection of the robots for people, including training on another dataset and
+    /// an early stop by a signal.
     pub fn selection(&self) -> String {
         let stopped = if self.stopped { "; stopped before the last of them" } else { "" };
         let trained =
@@ -383,10 +383,10 @@ impl EvalFile {
         format!("{}{trained}{stopped}", self.selected)
     }
 
-    /// Reads an evaluation of robots of these runs as they are now, and of no others.
+    /// Reads an evaluation of robots of these runs in their present state, and of no others.
     ///
     /// # Errors
-    /// As of [`EvalFile::read`]; or that it is about other runs, or another state of them.
+    /// Returns the errors of [`EvalFile::read`], or an error if the runs or their states differ.
     pub fn of_runs(path: &Path, runs: &[&RunFile]) -> Result<Self, Error> {
         let file = Self::read(path)?;
         let now: Vec<String> = runs.iter().map(|run| run.fingerprint()).collect();
@@ -411,18 +411,18 @@ impl EvalFile {
     /// Reads `eval.json`.
     ///
     /// # Errors
-    /// What is wrong with the file, with its line and key.
+    /// Returns an error, with its line and key, if the file is missing or invalid.
     pub fn read(path: &Path) -> Result<Self, Error> {
         results::read(path, Some("eval"))
     }
 
-    /// Its text, one line.
+    /// Encodes the file as one line of JSON.
     pub fn to_json(&self) -> String {
-        // Numbers are finite, keys are text or whole numbers: JSON has all of it.
+        // Numbers are finite, keys are text or whole numbers, so encoding cannot fail.
         serde_json::to_string(self).expect("JSON has all of it") + "\n"
     }
 
-    /// `eval.csv`: a line per robot.
+    /// Encodes `eval.csv`: a line per robot.
     pub fn to_csv(&self) -> Vec<u8> {
         let classes: Vec<u8> =
             self.robots.first().map_or(Vec::new(), |robot| robot.per_class.keys().copied().collect());

@@ -1,4 +1,4 @@
-//! A run's folder: made, locked, and never overwritten by accident.
+//! A run's folder: created, locked, and never overwritten by accident.
 
 use crate::base::error::Error;
 use crate::base::files::{check_file, check_writable, remove_half_written, write_atomically};
@@ -19,12 +19,12 @@ use crate::store::run::RunFile;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-/// The folder in the present one that runs go to if nothing else is said.
+/// The default folder of runs, in the current folder.
 pub const RUNS: &str = "runs";
 
 const OF_RUN: &str = "expected another name: this would overwrite a file of a run";
 
-/// What commands find, beside a run.
+/// The files that commands write beside a run.
 const RESULTS: [&str; 8] = [
     AUDIT_JSON,
     CAPACITY_JSON,
@@ -36,12 +36,12 @@ const RESULTS: [&str; 8] = [
     VALIDATION_JSON,
 ];
 
-/// What to do with a folder that holds a run already.
+/// The treatment of a folder that already holds a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IfExists {
-    /// Refuse.
+    /// Refuse to use it.
     Refuse,
-    /// Go on with the run in it.
+    /// Continue the run in it.
     Resume,
     /// Delete the run in it.
     Overwrite,
@@ -51,18 +51,18 @@ pub enum IfExists {
 #[derive(Debug)]
 pub struct RunFolder {
     path: PathBuf,
-    /// Whether it replaces what is in it.
+    /// True if it replaces the run in it.
     replaces: bool,
     _lock: Lock,
 }
 
-/// Whether a process is at work on the run in a folder.
+/// Returns true if a process is working on the run in a folder.
 pub fn is_in_use(folder: &Path) -> bool {
     matches!(lock::state(&folder.join(LOCK)), Ok(lock::State::Held(_)))
 }
 
 impl RunFolder {
-    /// Makes the folder if there is none, and takes it into use.
+    /// Creates the folder if necessary, and takes its lock.
     ///
     /// # Errors
     /// If another process uses it, or it holds a run and `if_exists` says to refuse, or it cannot
@@ -91,7 +91,7 @@ impl RunFolder {
         refuse_run()?;
         remove_half_written(path, &RunFolder::files()).map_err(|error| Error::writing(path, &error))?;
         if if_exists == IfExists::Overwrite {
-            // A config is written if it says something else: what its author wrote about it stays.
+            // An unchanged config stays, with its author's comments.
             for name in RunFolder::files().into_iter().filter(|name| *name != CONFIG) {
                 let file = path.join(name);
                 match std::fs::remove_file(&file) {
@@ -105,16 +105,17 @@ impl RunFolder {
         Ok(RunFolder { path: path.to_path_buf(), replaces: if_exists == IfExists::Overwrite, _lock: lock })
     }
 
-    /// Where it is.
+    /// Returns the path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Writes the run's config. One that says the same stays as it is, with its comments: it may be
-    /// what this run was asked for with.
+    /// Writes the run's config. An equal one stays as it is, with its comments: it may be the file
+    /// that this run was started with.
     ///
     /// # Errors
-    /// If a file of that name, without a run beside it, is somebody else's; what the system says.
+    /// Returns an error if a different file of that name, without a run beside it, is in the way,
+    /// or the file cannot be written.
     pub(crate) fn write_config(&self, config: &Config) -> Result<(), Error> {
         let path = self.path.join(CONFIG);
         let text = read_text(&path).ok();
@@ -123,7 +124,7 @@ impl RunFolder {
         if there.as_ref() == Some(config) {
             return Ok(());
         }
-        // A run that was killed before its first checkpoint leaves one that a program wrote.
+        // A run that was killed before its first checkpoint leaves a config that morphcog wrote.
         let is_written = || there.is_some_and(|there| text == Some(there.to_toml()));
         if !self.replaces && path.exists() && vacant(&self.path).is_ok() && !is_written() {
             let text = format!("{}: there is a file of that name that says something else", path.display());
@@ -133,17 +134,17 @@ impl RunFolder {
         write_atomically(&path, config.to_toml().as_bytes()).map_err(|error| Error::writing(&path, &error))
     }
 
-    /// Names of the files of a run.
+    /// Returns the file names of a run.
     pub(crate) fn files() -> [&'static str; 8] {
         let [newest, previous] = CHECKPOINTS;
         [RUN_JSON, CONFIG, ELITES, METRICS, DATA_FOLDER, TRAINING_JSON, newest, previous]
     }
 }
 
-/// Whether a folder is free for a new run.
+/// Checks that a folder is free for a new run.
 ///
 /// # Errors
-/// If it holds a run.
+/// Returns an error if it holds a run.
 pub fn vacant(folder: &Path) -> Result<(), Error> {
     let of_run = RunFolder::files().into_iter().filter(|name| ![CONFIG, DATA_FOLDER].contains(name));
     if !of_run.into_iter().any(|name| folder.join(name).exists()) {
@@ -154,28 +155,28 @@ pub fn vacant(folder: &Path) -> Result<(), Error> {
     Err(error.remedy(Remedy::ChooseOut).remedy(Remedy::Replace))
 }
 
-/// What a run of a config is called: the config's name without folder and ending.
+/// Returns the name of a config's run: the config's name without folder and extension.
 pub fn name_of(config: &str) -> String {
     let path = Path::new(config);
-    // The config of a run makes that run again.
+    // The config of a run reproduces that run.
     let beside = path.with_file_name(RUN_JSON);
     if path.file_name().is_some_and(|name| name == CONFIG)
         && beside.exists()
         && let Ok(run) = RunFile::read(&beside)
     {
-        // Nothing that leads elsewhere, whatever the file says.
+        // Uses only the file name, so that the text of a file cannot lead elsewhere.
         let name = Path::new(&run.name).file_name();
         return name.map_or("run".to_string(), |name| name.to_string_lossy().into_owned());
     }
     path.file_stem().map_or("run".to_string(), |stem| stem.to_string_lossy().into_owned())
 }
 
-/// Whether results can be written to a file, with a CSV beside it, and overwrite neither each other
-/// nor what lies beside the run or result file that they are of: files of the run, or what other
-/// commands found, each under the name of its command. `own` is the default name of these results.
+/// Checks that results can be written to a file, with a CSV beside it, without overwriting each
+/// other or files of `of`, their run or result file: files of the run, or results of other commands
+/// under their usual names. `own` is the default name of these results.
 ///
 /// # Errors
-/// If not.
+/// Returns an error if they cannot.
 pub(crate) fn check_out(out: &Path, of: &Path, own: &str) -> Result<(), Error> {
     of_file(out)?;
     let refuse = |text: &str| Err(Error::argument("out", out.display(), text));
@@ -204,17 +205,17 @@ pub(crate) fn check_out(out: &Path, of: &Path, own: &str) -> Result<(), Error> {
     Ok(())
 }
 
-/// Whether there is a run beside a file.
+/// Returns true if there is a run beside a file.
 fn holds_run(path: &Path) -> bool {
     path.with_file_name(RUN_JSON).exists()
 }
 
-/// What is meant by a path: also what a link leads to.
+/// Yields a path and the target of its link.
 fn meant(path: &Path) -> impl Iterator<Item = PathBuf> {
     [Some(path.to_path_buf()), path.canonicalize().ok()].into_iter().flatten()
 }
 
-/// Whether a file is, or would be, one of those of a run or a task.
+/// Returns true if a file is, or would be, one of those of a run or a task.
 fn is_of_run(path: &Path) -> bool {
     let is_one_of =
         |path: &Path, names: &[&str]| names.iter().any(|name| path.file_name() == Some(name.as_ref()));
@@ -225,7 +226,7 @@ fn is_of_run(path: &Path) -> bool {
     })
 }
 
-/// Whether a file is what a command found of a run.
+/// Returns true if a file is a command's result about a run.
 fn is_result(path: &Path) -> bool {
     let is_it = |path: &Path, result: &&str| {
         let endings =
@@ -235,11 +236,11 @@ fn is_result(path: &Path) -> bool {
     meant(path).any(|path| holds_run(&path) && RESULTS.iter().any(|result| is_it(&path, result)))
 }
 
-/// Whether a file can be written, and is neither of a run nor what was found of one: to be known
-/// before what goes into it is made.
+/// Checks, before expensive work, that a file can be written and belongs to no run and no results
+/// of one.
 ///
 /// # Errors
-/// Why not.
+/// Returns an error with the reason if it cannot.
 pub fn writable(path: &Path) -> Result<(), Error> {
     if is_result(path) {
         return Err(Error::usage(format!("{}: {OF_RUN}", path.display())));
@@ -254,10 +255,10 @@ fn not_of_run(path: &Path) -> Result<(), Error> {
     check_writable(path).map_err(|error| Error::writing(path, &error))
 }
 
-/// Whether a path can be one of a file: it ends with a name.
+/// Checks that a path can be a file's: it ends with a name.
 ///
 /// # Errors
-/// If not.
+/// Returns an error if it does not.
 pub fn of_file(path: &Path) -> Result<(), Error> {
     let last = path.as_os_str().as_encoded_bytes().last();
     let ends_open = last.is_some_and(|&byte| std::path::is_separator(byte.into()));
@@ -267,15 +268,15 @@ pub fn of_file(path: &Path) -> Result<(), Error> {
     }
 }
 
-/// What a file's name says of whose it is: capacity.trainings.json is capacity's, too.
+/// Returns the owner in a file's name: capacity.trainings.json belongs to capacity, too.
 fn before_dot(name: &OsStr) -> Option<&[u8]> {
     name.as_encoded_bytes().split(|&byte| byte == b'.').next()
 }
 
-/// The run.json that is meant by its path or its folder's; or every one of those that are named together.
+/// Returns the run.json at a path or in a folder, or all runs of a shipped name.
 ///
 /// # Errors
-/// If none that ships with the program has that name; if it is another kind of file.
+/// Returns an error if nothing shipped has that name, or the path is another kind of file.
 pub fn run_json(path: PathBuf) -> Result<Vec<PathBuf>, String> {
     if shipped::is_named(&path) {
         shipped::runs(&path)
@@ -290,10 +291,10 @@ pub fn run_json(path: PathBuf) -> Result<Vec<PathBuf>, String> {
     }
 }
 
-/// The same, where one run is wanted.
+/// Returns the only run at a path.
 ///
 /// # Errors
-/// As [`run_json`]; if several are named together.
+/// Returns the errors of [`run_json`], or an error if there are several.
 pub fn one_run(path: PathBuf) -> Result<PathBuf, String> {
     let mut runs = run_json(path)?;
     match runs.as_slice() {
@@ -305,15 +306,15 @@ pub fn one_run(path: PathBuf) -> Result<PathBuf, String> {
     }
 }
 
-/// The first of the runs that are named together.
+/// Returns the first run at a path.
 ///
 /// # Errors
-/// As [`run_json`].
+/// Returns the errors of [`run_json`].
 pub fn first_run(path: PathBuf) -> Result<PathBuf, String> {
     Ok(run_json(path)?.into_iter().next().expect("a path means at least one run"))
 }
 
-/// Names a run for a command's `archive`: by its name if it has one, else by its run.json.
+/// Returns a run as a value for `--archive`: its name if it ships, else its run.json.
 pub fn archive(run_json: &Path) -> Value {
     match full_name(run_json) {
         Some(name) => Value::Word(name),
@@ -321,18 +322,17 @@ pub fn archive(run_json: &Path) -> Value {
     }
 }
 
-/// The name of a run that is named, as "gallery:zero_one-1".
+/// Returns the full name of a shipped run, such as "gallery:zero_one-1".
 pub(crate) fn full_name(run_json: &Path) -> Option<String> {
     shipped::name(run_json).map(|(of, run)| format!("{of}:{run}"))
 }
 
-/// What a run is called in a message: its name if it has one, else its run.json.
+/// Returns a run's name for messages: its full name if it ships, else its run.json.
 pub fn name(run_json: &Path) -> String {
     full_name(run_json).unwrap_or_else(|| run_json.display().to_string())
 }
 
-/// Where results of a run go if nothing is said: beside its run.json; those of a named one to the
-/// present folder.
+/// Returns the default path of a run's results: beside its run.json, or here for a shipped run.
 pub fn beside(archive: &Path, name: &str) -> PathBuf {
     match shipped::name(archive) {
         // The published robots have no name besides.
@@ -342,8 +342,8 @@ pub fn beside(archive: &Path, name: &str) -> PathBuf {
     }
 }
 
-/// Where results of several runs together go if nothing is said: to the folder that all lie in; with
-/// named ones, to the present folder, under the name of their set if all are of one.
+/// Returns the default path of joint results of several runs: in their common folder. With shipped
+/// runs it is in the current folder, with the name of their set if they share one.
 pub fn beside_all(archives: &[PathBuf], name: &str) -> PathBuf {
     let [first, others @ ..] = archives else { return PathBuf::from(name) };
     if others.is_empty() {
@@ -353,13 +353,13 @@ pub fn beside_all(archives: &[PathBuf], name: &str) -> PathBuf {
         return above(archives).join(name);
     };
     match shipped::set(first).filter(|set| others.iter().all(|other| shipped::set(other) == Some(*set))) {
-        // `team.json` of `gallery:team` says it already.
+        // `team.json` of `gallery:team` already has it.
         Some((of, set)) if !name.starts_with(set) => PathBuf::from(format!("{of}-{set}-{name}")),
         _ => PathBuf::from(format!("{of}-{name}")),
     }
 }
 
-/// The folder of a run.json; of several, the nearest that all of them lie in.
+/// Returns the folder of a run.json, or the nearest folder that contains several.
 fn above(archives: &[PathBuf]) -> PathBuf {
     let folders: Vec<&Path> = archives.iter().map(|path| path.parent().unwrap_or(Path::new(""))).collect();
     let Some(first) = folders.first() else { return PathBuf::new() };
@@ -367,10 +367,10 @@ fn above(archives: &[PathBuf]) -> PathBuf {
     first.ancestors().find(holds).unwrap_or(Path::new("")).to_path_buf()
 }
 
-/// The run.json under `runs/` that was written last: what commands look at when they are not told.
+/// Returns the most recent run.json under `runs/`, which commands use by default.
 ///
 /// # Errors
-/// If there is none.
+/// Returns an error if there is none.
 pub fn newest_run() -> Result<PathBuf, Error> {
     let runs = std::fs::read_dir(RUNS).into_iter().flatten().flatten();
     let files = runs.map(|entry| entry.path().join(RUN_JSON));

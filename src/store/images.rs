@@ -1,5 +1,4 @@
-//! Which images a run was made with and robots are shown: by their places in a dataset, and as
-//! robots see them.
+//! References to the images of runs and evaluations: places in a dataset, and held-out choices.
 
 use crate::data::dataset::Split;
 use crate::task::score::Answer;
@@ -9,29 +8,29 @@ use std::borrow::Cow;
 use std::fmt;
 use std::str::FromStr;
 
-/// An image by its place in a dataset.
+/// An image by its index in a dataset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct ImageRef {
-    /// Index in its split.
+    /// The index in its split.
     pub index: usize,
-    /// Its class.
+    /// The class.
     pub label: u8,
 }
 
-/// Which data a run was made with, wherever they lay: the same data have the same fingerprint.
+/// The data of a run, identified by content wherever the files were.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct DatasetRef {
-    /// Name of the dataset.
+    /// The name of the dataset.
     pub name: String,
-    /// SHA-256 of the training split's content.
+    /// The SHA-256 of the training split's content.
     pub train_sha256: String,
 }
 
-/// Which images that robots are not trained on.
+/// The kind of images that robots are not trained on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum HeldOut {
-    /// Those of the test split, which nothing should be chosen by.
+    /// The images of the test split, by which nothing should be chosen.
     #[default]
     Test,
     /// Validation images.
@@ -39,12 +38,12 @@ pub enum HeldOut {
 }
 
 impl HeldOut {
-    /// Whether a file needs not say it.
+    /// Returns true if files may omit it.
     pub(crate) fn is_default(&self) -> bool {
         *self == HeldOut::default()
     }
 
-    /// The split of the dataset that these images are of.
+    /// Returns the split of the dataset that has these images.
     pub fn split(&self) -> Split {
         match self {
             HeldOut::Test => Split::Test,
@@ -70,17 +69,17 @@ impl FromStr for HeldOut {
     }
 }
 
-/// How many held-out images are shown.
+/// The number of held-out images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum HowMany {
-    /// All that there are of the classes.
+    /// All images of the classes.
     All,
-    /// So many in all, evenly divided between the classes.
+    /// A total that is evenly divided between the classes.
     Evenly(usize),
 }
 
 impl HowMany {
-    /// Whether that is an image of each of so many classes.
+    /// Returns true if the number allows an image of each class.
     pub(crate) fn has_each(self, classes: usize) -> bool {
         match self {
             HowMany::All => true,
@@ -121,7 +120,7 @@ impl Serialize for HowMany {
 
 impl<'de> Deserialize<'de> for HowMany {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        /// A number or a word, either of which is read as text.
+        /// A number or a word; both are parsed as text.
         #[derive(Deserialize)]
         #[serde(untagged)]
         enum Written {
@@ -152,8 +151,7 @@ impl JsonSchema for HowMany {
     }
 }
 
-/// The answers that displacements under images are, in their order; those that are missing are
-/// still to come.
+/// Returns the answers to images, in their order; displacements that are missing are yet unknown.
 pub(crate) fn answers(
     images: &[ImageRef],
     displacements: impl IntoIterator<Item = Option<f64>>,

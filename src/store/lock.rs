@@ -1,8 +1,8 @@
-//! [`Lock`]: a file that says that a process is at work in a folder.
+//! [`Lock`]: a file that marks a folder as in use by a process.
 //!
-//! Where the file system has locks, the system lets one go when its process ends, however it ends.
-//! Some parallel file systems have none, and others have them on one machine only. So the file also
-//! names host and process, and a heartbeat counts up in it: another process waits until it knows
+//! If the file system has locks, the system releases one when its process ends, however it ends.
+//! Some parallel file systems have none, and others limit them to one machine. So the file also
+//! names host and process, and contains a heartbeat counter. Another process waits until it knows
 //! whether the heart still beats.
 
 use crate::base::error::Error;
@@ -20,35 +20,34 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
 
-/// Time between two heartbeats. Longer: a dead process is known later; shorter: more writes to a
-/// shared file system.
+/// The time between two heartbeats. Larger values detect a dead process later; smaller ones write
+/// more to a shared file system.
 const BEAT: Duration = Duration::from_secs(5);
 
-/// A heart that did not beat for so long is dead. Longer: a task that was killed elsewhere begins
-/// later; shorter: a file system that hesitates looks like a death.
+/// The silence after which a heart is dead. Larger values delay tasks that were killed elsewhere;
+/// smaller ones mistake a slow file system for a death.
 const DEAD_AFTER: Duration = Duration::from_secs(25);
 
-/// A heart that did not beat for so long is dead whatever the clocks say. Longer: more dead ones are
-/// watched; shorter: clocks that differ more make living ones look dead.
+/// The silence after which a heart is dead whatever the clocks say. Larger values watch more dead
+/// processes; smaller ones mistake clock differences for deaths.
 const LONG_DEAD: Duration = Duration::from_secs(3600);
 
-/// How often a waiting process looks.
+/// The time between checks of a waiting process.
 const LOOK: Duration = Duration::from_millis(500);
 
-/// How often a lock is tried: another process may hold it for a moment, only to see whether it is
-/// held.
+/// The number of attempts to take a lock, because another process may hold it briefly for a check.
 const TRIES: u32 = 5;
 
-/// Who is at work.
+/// The process that holds a lock.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Holder {
-    /// Name of the machine.
+    /// The name of the machine.
     pub host: String,
-    /// Number of the process.
+    /// The number of the process.
     pub process: u32,
-    /// Heartbeats so far, counted from the time of its beginning \[ns\]: processes in containers may
-    /// have the same number on machines of the same name.
+    /// The heartbeat counter, which starts at the current time \[ns\]. Processes in containers may
+    /// share numbers and machine names.
     pub beats: u64,
 }
 
@@ -58,28 +57,28 @@ impl std::fmt::Display for Holder {
     }
 }
 
-/// What a lock file says.
+/// The state of a lock file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum State {
-    /// Nobody is at work.
+    /// No process holds it.
     Free,
-    /// A process is at work; its name, if the file says it.
+    /// A process holds it, with its name if the file contains it.
     Held(Option<Holder>),
-    /// A process was at work, and ended without letting go.
+    /// A process held it, and ended without releasing it.
     Stale(Holder),
-    /// A process was at work, and its heart has been silent for too long, by the clock of this
-    /// machine: its own may go behind.
+    /// A process held it, but its heart has been silent for too long by this machine's clock. The
+    /// other clock may be behind.
     Silent(Holder),
 }
 
-/// Why a lock could not be taken.
+/// A reason why a lock was not taken.
 #[derive(Debug)]
 pub enum Refusal {
-    /// Another process has it; its name, if the file says it.
+    /// Another process holds it, with its name if the file contains it.
     Held(Option<Holder>),
-    /// It was told to stop while it waited.
+    /// A stop signal ended the wait.
     Stopped,
-    /// The file cannot be made or written.
+    /// The file cannot be created or written.
     Io(io::Error),
     /// There is no thread for the heartbeat.
     NoThread(Error),
@@ -98,7 +97,7 @@ impl From<Stopped> for Refusal {
 }
 
 impl Refusal {
-    /// The error for the user: `held` says what another process does, `advice` what to do.
+    /// Converts to an error for the user: `held` describes the other process, `advice` the remedy.
     pub fn into_error(self, path: &Path, held: &str, advice: &str) -> Error {
         match self {
             Refusal::Held(holder) => {
@@ -112,12 +111,12 @@ impl Refusal {
     }
 }
 
-/// How locks are taken: the system's, and how long a heart may be silent.
+/// The policy of taking locks: system locks, and the silence allowed.
 #[derive(Clone, Copy, Debug)]
 struct LockPolicy {
-    /// Whether the file system's own locks are tried.
+    /// True if the file system's own locks are used.
     by_system: bool,
-    /// Whether others may have taken the system's lock elsewhere at the same time.
+    /// True if others may take the system's lock on another machine at the same time.
     is_contended: bool,
     beat: Duration,
     dead_after: Duration,
@@ -126,20 +125,20 @@ struct LockPolicy {
 const DEFAULT: LockPolicy =
     LockPolicy { by_system: true, is_contended: false, beat: BEAT, dead_after: DEAD_AFTER };
 
-/// A taken lock; let go when it is dropped. As long as it is there, this process writes to the folder
-/// only what it may: see [`Ownership`].
+/// A taken lock, released on drop. While it exists, this process writes to the folder only what it
+/// may: see [`Ownership`].
 #[derive(Debug)]
 pub struct Lock {
     own: Arc<Own>,
     heart: Option<JoinHandle<()>>,
     _ownership: Ownership,
-    /// With the system's lock on it.
+    /// Carries the system's lock.
     _file: File,
 }
 
 impl Lock {
-    /// Takes a lock. If the file names a process that may be alive on another machine, it says so,
-    /// and waits up to 25 seconds for its next heartbeat.
+    /// Takes a lock. If the file names a process that may be alive on another machine, it notes so
+    /// and waits up to 25 seconds for the next heartbeat.
     ///
     /// # Errors
     /// If another process has it; if it is stopped while it waits; what the system says.
@@ -147,9 +146,9 @@ impl Lock {
         Lock::take_in(path, DEFAULT, session)
     }
 
-    /// The same of a lock that processes on several machines want at once, as those of a cluster's
-    /// job begin with the same task. A file system's locks may be known on one machine only, so it
-    /// looks after half a second whether its name is still there.
+    /// Takes a lock that processes on several machines may want at once, as when a cluster's jobs
+    /// begin with the same task. Locks of a file system may be limited to one machine, so it checks
+    /// after half a second if the file still names this process.
     ///
     /// # Errors
     /// As [`Lock::take`].
@@ -162,7 +161,7 @@ impl Lock {
         let is_locked = lock(&file, policy)?;
         let host = gethostname().to_string_lossy().into_owned();
         if let Some(before) = read(path)? {
-            // What was on this machine and has no lock any more has ended.
+            // A process of this machine that no longer holds the system's lock has ended.
             let has_ended = is_locked && before.host == host;
             if !has_ended {
                 let seconds = policy.dead_after.as_secs_f64().ceil();
@@ -176,7 +175,7 @@ impl Lock {
         let own = Holder { host, process: std::process::id(), beats: now() };
         write(path, &own)?;
         if !is_locked || policy.is_contended {
-            // Two that found it free at once: the one whose name stays has it.
+            // If two processes found it free at once, the one whose name remains has it.
             std::thread::sleep(LOOK);
             if read(path)?.as_ref() != Some(&own) {
                 return Err(Refusal::Held(read(path)?));
@@ -199,22 +198,22 @@ impl Drop for Lock {
         self.own.state().is_over = true;
         self.own.wake.notify_all();
         if let Some(heart) = self.heart.take() {
-            // It does nothing that can panic; if it did, the lock goes all the same.
+            // The thread cannot panic; if it did, the lock is released all the same.
             let _ = heart.join();
         }
-        // If this cannot be written, the lock is found stale.
+        // If this write fails, the lock is found stale.
         if self.own.check().is_ok() {
             let _ = File::options().write(true).truncate(true).open(&self.own.path);
         }
     }
 }
 
-/// The name of this process in a lock file, and its heart.
+/// This process's name in a lock file, and its heart.
 #[derive(Debug)]
 struct Own {
     path: PathBuf,
     host: String,
-    /// The first of its heartbeats.
+    /// The first heartbeat.
     first: u64,
     state: Mutex<Heart>,
     /// Wakes the heart at the end.
@@ -237,22 +236,22 @@ impl Own {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether the file still names this process.
+    /// Checks that the file still names this process.
     ///
     /// # Errors
-    /// [`Lost`]; what the system says if it cannot be read.
+    /// Returns [`Lost`] if it does not, or the system's error if the file cannot be read.
     fn check(&self) -> io::Result<()> {
         self.check_at(&self.state())
     }
 
-    /// The same; no heartbeat is written meanwhile.
+    /// Does the same while no heartbeat is written.
     fn check_at(&self, heart: &Heart) -> io::Result<()> {
         let removed = || Lost::Removed { lock: self.path.clone() };
         let found = match read(&self.path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Err(removed().into()),
             found => found?.ok_or_else(removed)?,
         };
-        // A beat that failed may have been written all the same.
+        // A failed heartbeat may have been written all the same.
         let is_own = (&found.host, found.process) == (&self.host, std::process::id())
             && (self.first..=heart.beats + 1).contains(&found.beats);
         match is_own {
@@ -261,13 +260,13 @@ impl Own {
         }
     }
 
-    /// Beats until the end, as long as the file names the process.
+    /// Beats until the end, as long as the file names this process.
     fn beat(&self, pause: Duration) {
         let mut heart = self.state();
         while !heart.is_over {
             let waited = self.wake.wait_timeout(heart, pause).unwrap_or_else(PoisonError::into_inner);
             heart = waited.0;
-            // A heartbeat that cannot be written is tried again.
+            // The next beat retries a failed write.
             if !heart.is_over && waited.1.timed_out() && self.check_at(&heart).is_ok() {
                 let (host, process) = (self.host.clone(), std::process::id());
                 let beaten = write(&self.path, &Holder { host, process, beats: heart.beats + 1 });
@@ -277,16 +276,16 @@ impl Own {
     }
 }
 
-/// Nanoseconds since 1970.
+/// Returns the nanoseconds since 1970.
 fn now() -> u64 {
     let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     u64::try_from(since.as_nanos()).unwrap_or_default()
 }
 
-/// What lock files say. Hearts that are silent by the clock of this machine are watched for a little
-/// longer than a heartbeat, all of them at once.
+/// Returns the states of lock files. It watches hearts that are silent by this machine's clock
+/// slightly longer than a heartbeat, all at once.
 pub fn states(paths: &[PathBuf]) -> Vec<State> {
-    // What cannot be read says nothing.
+    // An unreadable file gives no information.
     let mut all: Vec<State> = paths.iter().map(|path| state(path).unwrap_or(State::Free)).collect();
     let began = Instant::now();
     while all.iter().any(|state| matches!(state, State::Silent(_))) {
@@ -305,16 +304,16 @@ pub fn states(paths: &[PathBuf]) -> Vec<State> {
     all
 }
 
-/// What a lock file says; it takes no time, and the system's lock for a moment only, to see whether
-/// it is held.
+/// Returns the state of a lock file at once. It takes the system's lock for a moment, to see if it
+/// is held.
 ///
 /// # Errors
-/// What the system says.
+/// Returns the system's error.
 pub fn state(path: &Path) -> io::Result<State> {
     use io::ErrorKind::{NotFound, PermissionDenied, ReadOnlyFilesystem};
     let file = match File::options().read(true).write(true).open(path) {
         Err(error) if error.kind() == NotFound => return Ok(State::Free),
-        // Others may look, too, and from everywhere.
+        // Other users may check, too, and from any machine.
         Err(error) if [PermissionDenied, ReadOnlyFilesystem].contains(&error.kind()) => File::open(path)?,
         opened => opened?,
     };
@@ -330,7 +329,7 @@ pub fn state(path: &Path) -> io::Result<State> {
     let Some(holder) = holder else { return Ok(State::Free) };
     let is_here = holder.host == gethostname().to_string_lossy();
     let beaten = file.metadata()?.modified()?;
-    // A clock that goes ahead on the other machine counts as no time.
+    // If the other machine's clock is ahead, no time has passed.
     let silent = SystemTime::now().duration_since(beaten).unwrap_or_default();
     let has_ended = silent > LONG_DEAD || is_here && is_locked == Some(false);
     Ok(match () {
@@ -340,7 +339,7 @@ pub fn state(path: &Path) -> io::Result<State> {
     })
 }
 
-/// Takes the system's lock; whether the system has locks.
+/// Takes the system's lock; returns true if the system has locks.
 fn lock(file: &File, policy: LockPolicy) -> Result<bool, Refusal> {
     if !policy.by_system {
         return Ok(false);
@@ -359,12 +358,12 @@ fn lock(file: &File, policy: LockPolicy) -> Result<bool, Refusal> {
     Err(Refusal::Held(serde_json::from_str(&text).ok()))
 }
 
-/// Who is named in a lock file; what is no name, as after a power cut, is none.
+/// Reads the holder in a lock file; invalid text, as after a power cut, gives `None`.
 fn read(path: &Path) -> io::Result<Option<Holder>> {
     Ok(serde_json::from_slice(&read_bytes(path)?).ok())
 }
 
-/// Names a holder; the text has the same length at every heartbeat, so that it is never half there.
+/// Writes the holder. The text always has the same length, so that readers never see a part.
 fn write(path: &Path, holder: &Holder) -> io::Result<()> {
     let text = serde_json::to_string(holder).expect("a text and two numbers are JSON");
     let mut file = File::options().write(true).truncate(false).open(path)?;
@@ -373,7 +372,7 @@ fn write(path: &Path, holder: &Holder) -> io::Result<()> {
     file.set_len(room as u64 + 1)
 }
 
-/// Whether a heart beats, or lets go and is taken by another, within some time.
+/// Returns true if a heart beats, or another process takes the lock, within some time.
 ///
 /// # Errors
 /// If it is stopped before it knows; what the system says.
@@ -399,7 +398,7 @@ mod tests {
 
     use std::sync::atomic::AtomicBool;
 
-    /// No locks of the system, and a quick heart.
+    /// No system locks, and a fast heart.
     const WITHOUT: LockPolicy = LockPolicy {
         by_system: false,
         is_contended: false,
@@ -411,7 +410,7 @@ mod tests {
         folder.path().join("lock")
     }
 
-    /// A name like that of this process.
+    /// Returns a name like that of this process.
     fn own() -> Holder {
         let host = gethostname().to_string_lossy().into_owned();
         Holder { host, process: std::process::id(), beats: 0 }
@@ -455,7 +454,7 @@ mod tests {
         drop(lock);
     }
 
-    /// Keeps what is noted, and stops at the first note.
+    /// Keeps the notes, and stops at the first.
     struct Stopping<'a>(&'a AtomicBool, Mutex<Vec<String>>);
 
     impl Observer for Stopping<'_> {
@@ -476,7 +475,7 @@ mod tests {
         assert!(matches!(Lock::take(&path, &session), Err(Refusal::Stopped)));
         let notes = observer.1.into_inner().unwrap();
         assert!(matches!(&notes[..], [note] if note.contains("process 7 on another-machine")), "{notes:?}");
-        // The name stays: nobody knows yet whether that process lives.
+        // The name stays: nobody knows yet if that process lives.
         assert_eq!(read(&path).unwrap().unwrap().process, 7);
     }
 

@@ -15,30 +15,30 @@ use std::fs::File;
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-/// What a run has done so far. *Showings* are images shown to robots (fresh rollouts, or phases of
-/// sequential ones).
+/// The counts of a run so far. *Showings* are presentations of an image to a robot: fresh rollouts,
+/// or phases of sequential ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Totals {
-    /// Offspring made.
+    /// The number of offspring made.
     pub evaluations: u64,
-    /// Showings simulated.
+    /// The number of showings simulated.
     pub simulated: u64,
-    /// Showings saved because the body was known.
+    /// The number of showings saved because the body was known.
     pub saved_known_bodies: u64,
-    /// Showings saved by stopping early (or because an earlier one was unstable).
+    /// The number of showings saved by stopping early (or because an earlier one was unstable).
     pub saved_early_stop: u64,
-    /// Showings saved because another image looks the same to the sensors.
+    /// The number of showings saved because another image looks the same to the sensors.
     pub saved_shared_rollouts: u64,
-    /// Offspring found unstable.
+    /// The number of unstable offspring.
     pub unstable: u64,
-    /// Wall-clock time, all sessions of the run together \[s\].
+    /// The wall-clock time of all sessions of the run \[s\].
     #[serde(deserialize_with = "ranges::size")]
     pub seconds: f64,
 }
 
 impl Totals {
-    /// Showings saved altogether.
+    /// Returns the total of showings saved.
     pub fn saved(&self) -> u64 {
         self.saved_known_bodies + self.saved_early_stop + self.saved_shared_rollouts
     }
@@ -54,25 +54,25 @@ impl Totals {
 const HEADER: &str = "generation,num_elites,coverage,qd_score,norm_qd_score,obj_max,obj_mean,evaluations,\
 simulated,saved,saved_known_bodies,saved_early_stop,saved_shared_rollouts,unstable,seconds";
 
-/// Writes `metrics.csv`.
+/// The writer of `metrics.csv`.
 pub struct Metrics {
     path: PathBuf,
     file: BufWriter<File>,
-    /// Generations before the one it goes on with that have no line in it any more.
+    /// The number of earlier generations whose lines are missing.
     pub missing: u64,
 }
 
 impl Metrics {
-    /// Opens it to go on after `generations` lines; later ones, from before an interruption, are
-    /// dropped.
+    /// Opens the file to continue after `generations` lines; later lines, from before an
+    /// interruption, are dropped.
     ///
     /// # Errors
-    /// If it cannot be read or written.
+    /// Returns an error if it cannot be read or written.
     pub fn open(folder: &Path, generations: u64) -> Result<Self, Error> {
         let path = folder.join(METRICS);
         let old = match read_bytes(&path) {
             _ if generations == 0 => String::new(),
-            // What is no text is no whole line, and left out as such.
+            // Invalid text is no whole line, and is dropped as such.
             Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
             Err(error) if error.kind() == ErrorKind::NotFound => String::new(),
             Err(error) => return Err(Error::reading(&path, &error)),
@@ -92,7 +92,7 @@ impl Metrics {
     /// Adds the line of a generation (from 0).
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// Returns an error if it cannot be written.
     pub fn write(&mut self, generation: u64, stats: &ArchiveStats, totals: &Totals) -> Result<(), Error> {
         let ArchiveStats { num_elites, coverage, qd_score, norm_qd_score, obj_max, obj_mean } = stats;
         let number = |value: &Option<f64>| value.map_or(String::new(), |value| value.to_string());
@@ -110,55 +110,55 @@ impl Metrics {
         .map_err(|error| Error::writing(&self.path, &error))
     }
 
-    /// Hands what was written to the system.
+    /// Flushes the lines to the system.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// Returns an error if they cannot be written.
     pub fn flush(&mut self) -> Result<(), Error> {
         let written = ownership::check(&self.path).and_then(|()| self.file.flush());
         written.map_err(|error| Error::writing(&self.path, &error))
     }
 }
 
-/// A line of `metrics.csv`, as far as figures show it.
+/// A line of `metrics.csv`, reduced to what figures need.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 pub struct Moment {
     /// The generation, from 0.
     pub generation: u64,
-    /// Offspring made so far.
+    /// The number of offspring made so far.
     #[serde(deserialize_with = "ranges::size")]
     pub evaluations: f64,
-    /// Elites per possible cell.
+    /// The share of possible cells with an elite.
     #[serde(deserialize_with = "ranges::share")]
     pub coverage: f64,
-    /// Sum of the objectives, each less the offset.
+    /// The sum of the objectives, each less the offset.
     #[serde(deserialize_with = "ranges::number")]
     pub qd_score: f64,
-    /// Largest objective; none without elites.
+    /// The largest objective; `None` without elites.
     #[serde(default, deserialize_with = "ranges::number")]
     pub obj_max: Option<f64>,
-    /// Wall-clock time so far \[s\].
+    /// The wall-clock time so far \[s\].
     #[serde(default, deserialize_with = "ranges::size")]
     pub seconds: f64,
 }
 
-/// Reads the metrics.csv beside a run.json, of which nothing else is known yet.
+/// Reads the metrics.csv beside a run.json, without checking that they match.
 ///
 /// # Errors
-/// What is missing or wrong, with its line.
+/// Returns an error, with its line, if the file is missing or invalid.
 pub fn moments(archive: &Path) -> Result<Vec<Moment>, Error> {
     let path = archive.with_file_name(METRICS);
     let text = read_text(&path).map_err(|error| Error::reading(&path, &error))?;
-    // A run under way may be writing the last line.
+    // A run in progress may be writing the last line.
     let whole = text.rfind('\n').map_or(text.as_str(), |end| &text[..=end]);
     parsed(whole).map_err(|error| error.in_place(&path.display().to_string()))
 }
 
-/// Reads the metrics.csv of a run: the line of the generation that its run.json holds has the
-/// figures that stand there. A run under way may have more lines.
+/// Reads the metrics.csv of a run and checks that the line of its run.json's generation has the
+/// same figures. A run in progress may have more lines.
 ///
 /// # Errors
-/// As [`moments`]; if it is of another run, or of another state of it.
+/// Returns the errors of [`moments`], or an error if the file is of another run or state.
 pub fn moments_of(run: &RunFile, archive: &Path) -> Result<Vec<Moment>, Error> {
     let moments = moments(archive)?;
     let Some(last) = run.generations.checked_sub(1) else { return Ok(moments) };

@@ -1,5 +1,4 @@
-//! Every file that a run folder may hold, as plain data with reading and writing; which robots of a
-//! run are meant; names and locks.
+//! Every file that a run folder may hold, as plain data with reading and writing; names and locks.
 
 pub mod audit;
 pub mod capacity;

@@ -1,35 +1,35 @@
 //! Names of the files in and beside a run's folder.
 
-/// What `audit` found, beside `run.json`.
+/// The verdicts of `audit`, beside `run.json`.
 pub const AUDIT_JSON: &str = "audit.json";
 
-/// What `capacity` found, beside `eval.json`.
+/// The results of `capacity`, beside `eval.json`.
 pub const CAPACITY_JSON: &str = "capacity.json";
 
-/// What `eval` found on test images, beside `run.json`.
+/// The results of `eval` on test images, beside `run.json`.
 pub const EVAL_JSON: &str = "eval.json";
 
-/// What `eval` found on validation images.
+/// The results of `eval` on validation images.
 pub const EVAL_VALIDATION_JSON: &str = "eval-validation.json";
 
-/// What `response` found, beside `run.json`.
+/// The results of `response`, beside `run.json`.
 pub const RESPONSE_JSON: &str = "response.json";
 
-/// What `team` found.
+/// The results of `team`.
 pub const TEAM_JSON: &str = "team.json";
-/// The same on validation images.
+/// The results of `team` on validation images.
 pub const TEAM_VALIDATION_JSON: &str = "team-validation.json";
 
-/// What a training keeps of its rollouts, beside `run.json`.
+/// The rollouts of a training, beside `run.json`.
 pub const TRAINING_JSON: &str = "training.json";
 
-/// How far a task of a sweep is, beside `run.json`.
+/// The state of a sweep's task, beside `run.json`.
 pub const TASK_JSON: &str = "task.json";
 
-/// The robots that were chosen on validation images, beside `run.json`.
+/// The robots chosen on validation images, beside `run.json`.
 pub const VALIDATION_JSON: &str = "validation.json";
 
-/// What a run remembers where its images were in, beside `run.json`.
+/// The folder that a run's images were in, beside `run.json`.
 pub const DATA_FOLDER: &str = "data-folder.json";
 
 /// The archive with everything that made it.
@@ -41,14 +41,14 @@ pub const CONFIG: &str = "config.toml";
 /// The elites for pyribs.
 pub const ELITES: &str = "elites.csv";
 
-/// Figures per generation.
+/// The metrics per generation.
 pub const METRICS: &str = "metrics.csv";
 
-/// File names of the newest checkpoint and the one before.
+/// The file names of the newest and the previous checkpoint.
 pub const CHECKPOINTS: [&str; 2] = ["checkpoint.json", "checkpoint.previous.json"];
 
-/// Who is at work in a run's folder.
+/// The lock of a run's folder.
 pub const LOCK: &str = ".lock";
 
-/// Who is at a task of a sweep.
+/// The lock of a sweep's task.
 pub const TASK_LOCK: &str = ".task.lock";

@@ -19,72 +19,72 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// What `response.json` calls itself.
+/// The `format` of `response.json`.
 pub const FORMAT: &str = "morphcog-response";
-/// Version of its schema.
+/// The newest version of its schema.
 pub const FORMAT_VERSION: u32 = 1;
 
-/// Endings of a robot's picture beside the results.
+/// The extensions of a robot's pictures beside the results.
 pub const PICTURES: [&str; 2] = ["svg", "png"];
 
 /// The content of `response.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ResponseFile {
-    /// "morphcog-response".
+    /// The constant "morphcog-response".
     #[schemars(extend("const" = FORMAT))]
     pub format: String,
-    /// Version of this schema.
+    /// The version of this schema.
     #[schemars(range(min = 1, max = FORMAT_VERSION))]
     pub format_version: u32,
-    /// Version of morphcog that wrote it.
+    /// The version of morphcog that wrote the file.
     pub program_version: String,
-    /// Name of the run the robots are from.
+    /// The name of the robots' run.
     pub run: String,
-    /// Its seed.
+    /// The seed of the run.
     pub run_seed: u64,
-    /// SHA-256 of its `run.json`.
+    /// The SHA-256 of its `run.json`.
     pub run_sha256: String,
-    /// How responses were measured.
+    /// The settings of the measurement.
     pub setting: Setting,
-    /// Robots whose measurement was stopped: the same command goes on with them.
+    /// The robots whose measurement was stopped; the same command continues them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unfinished: Vec<Unfinished>,
     /// The robots, in the order in which they were chosen.
     pub robots: Vec<RobotResponse>,
 }
 
-/// How responses were measured.
+/// The settings of a measurement.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Setting {
-    /// Seed of the random images.
+    /// The seed of the random images.
     pub seed: u64,
-    /// Most rollouts of a robot, those left aside that were known before.
+    /// The maximum number of rollouts per robot, not counting those known before.
     pub images: usize,
     /// The relative error of the slopes at which a measurement ends.
     #[serde(deserialize_with = "ranges::share")]
     pub error: f64,
-    /// The dataset that the task's images are of.
+    /// The dataset of the task's images.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dataset: Option<DatasetRef>,
-    /// What images were shown under by turns.
+    /// The conditions that alternate between images.
     pub conditions: Vec<Condition>,
-    /// For how many control steps each.
+    /// The number of control steps per image.
     pub control_steps: u32,
-    /// The task that robots could be taught, if one was named.
+    /// The task whose trained accuracy is estimated, if one was named.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub task: Option<String>,
-    /// How they would see its images.
+    /// The stimulus for that task's images.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stimulus: Option<StimulusParams>,
-    /// How many windows of its images were tried for each robot; 0: only that of `stimulus`.
+    /// The number of windows tried for each robot; 0: only that of `stimulus`.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub windows: usize,
 }
 
 impl Setting {
-    /// Whether both asked what gaits could be taught of the same task, seen in the same way.
+    /// Returns true if both have the same task, dataset, stimulus and windows.
     fn asks_as(&self, other: &Setting) -> bool {
         let asked = |setting: &Setting| {
             (setting.task.clone(), setting.dataset.clone(), setting.stimulus, setting.windows)
@@ -93,13 +93,13 @@ impl Setting {
     }
 }
 
-/// Why a measurement ended.
+/// The reason why a measurement ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum EndedBy {
-    /// The slopes were known well enough.
+    /// The slopes were accurate enough.
     Error,
-    /// There were as many rollouts as there might be.
+    /// The maximum number of rollouts was reached.
     Images,
 }
 
@@ -107,45 +107,44 @@ pub enum EndedBy {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RobotResponse {
-    /// Its id, or the name of a published robot.
+    /// The id, or the name of a published robot.
     pub id: String,
-    /// Its body.
+    /// The body.
     pub body: Body,
-    /// Rollouts that were simulated.
+    /// The number of rollouts simulated.
     pub rollouts: usize,
-    /// Of these, how many became unstable; they tell nothing.
+    /// The number of unstable rollouts among them, which do not count.
     pub unstable: usize,
-    /// Why there were no more.
+    /// The reason why there were no more.
     pub ended_by: EndedBy,
-    /// How far off the slopes are, as a share of what they are: 0 to 1.
+    /// The error of the slopes relative to their size, 0 to 1.
     #[serde(deserialize_with = "ranges::share")]
     pub relative_error: f64,
-    /// Share of the displacements' variance that slopes fitted to other rollouts explain.
+    /// The share of the displacements' variance that slopes fitted to other rollouts explain.
     #[serde(deserialize_with = "ranges::at_most_one")]
     pub r_squared: f64,
-    /// What these leave unexplained of a displacement: standard deviation \[voxel lengths\].
+    /// The standard deviation that these slopes leave unexplained \[voxel lengths\].
     #[serde(deserialize_with = "ranges::size")]
     pub noise: f64,
-    /// What the true slopes would leave unexplained \[voxel lengths\].
+    /// The part that the true slopes would leave unexplained \[voxel lengths\].
     #[serde(deserialize_with = "ranges::size")]
     pub scatter: f64,
     /// The penalty of the ridge regression.
     #[serde(deserialize_with = "ranges::size")]
     pub ridge: f64,
-    /// Displacement of a body whose places all had no width, the mean over conditions \[voxel
-    /// lengths\].
+    /// The displacement if no place had any width, the mean over conditions \[voxel lengths\].
     #[serde(deserialize_with = "ranges::number")]
     pub intercept: f64,
-    /// The same under each condition; none of one without stable rollouts.
+    /// The intercept under each condition; null without stable rollouts.
     #[serde(deserialize_with = "ranges::number")]
     pub intercepts: Vec<Option<f64>>,
-    /// Displacement of the gait under each random image, in the order in which they are drawn \[voxel
-    /// lengths\]; `null` where unstable. `train` begins with them.
+    /// The displacement of the gait under each random image, in the order of drawing \[voxel
+    /// lengths\]; null if unstable. `train` begins with them.
     #[serde(deserialize_with = "ranges::number")]
     pub displacements: Vec<Option<f64>>,
     /// The soft voxels and sensors, row-major.
     pub places: Vec<Place>,
-    /// What the gait could be taught, if that was asked for.
+    /// The estimate of what training could reach, if a task was named.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub taught: Option<Taught>,
 }
@@ -154,12 +153,11 @@ pub struct RobotResponse {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Unfinished {
-    /// Its id, or the name of a published robot.
+    /// The id, or the name of a published robot.
     pub id: String,
-    /// Its body.
+    /// The body.
     pub body: Body,
-    /// Displacement of the gait under each random image so far, as of a measured robot \[voxel
-    /// lengths\].
+    /// The displacements under the random images so far, as for a measured robot \[voxel lengths\].
     #[serde(deserialize_with = "ranges::number")]
     pub displacements: Vec<Option<f64>>,
 }
@@ -168,43 +166,42 @@ pub struct Unfinished {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Place {
-    /// Its row, from 0 at the top.
+    /// The row, from 0 at the top.
     pub row: usize,
-    /// Its column, from 0 on the left.
+    /// The column, from 0 on the left.
     pub column: usize,
-    /// By how much it moves the body to the right when it is wider by one rest width \[voxel
-    /// lengths\].
+    /// The body's displacement to the right per rest width of this place \[voxel lengths\].
     #[serde(deserialize_with = "ranges::number")]
     pub slope: f64,
-    /// The standard error of that \[voxel lengths\].
+    /// The standard error of the slope \[voxel lengths\].
     #[serde(deserialize_with = "ranges::size")]
     pub error: f64,
 }
 
 impl Place {
-    /// Whether the slope cannot be told from none: it is within two standard errors.
+    /// Returns true if the slope is within two standard errors of zero.
     pub fn is_uncertain(&self) -> bool {
         self.slope.abs() < 2.0 * self.error
     }
 }
 
-/// What a gait could be taught, by the linear model.
+/// The linear model's estimate of what training a gait could reach.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Taught {
-    /// Mean clipped margin of its answers, `mean_clipped`: from −1 to 1.
+    /// The mean clipped margin of its answers, `mean_clipped`: from −1 to 1.
     #[serde(deserialize_with = "ranges::number")]
     pub fitness: f64,
-    /// Its 95 % interval.
+    /// The 95 % interval of the fitness.
     #[serde(deserialize_with = "ranges::fitness_interval")]
     pub fitness_interval: [f64; 2],
-    /// Share of correct answers, both groups weighing the same.
+    /// The share of correct answers, with equal weight for both groups.
     #[serde(deserialize_with = "ranges::share")]
     pub accuracy: f64,
-    /// Its 95 % interval.
+    /// The 95 % interval of the accuracy.
     #[serde(deserialize_with = "ranges::interval")]
     pub accuracy_interval: [f64; 2],
-    /// The best window of those that were tried, by `stimulus.margin`.
+    /// The best window of those tried, as in `stimulus.margin`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub margin: Option<Margins>,
 }
@@ -224,7 +221,7 @@ impl From<Teachable> for Taught {
 }
 
 impl RobotResponse {
-    /// What rollouts with random images told of a gait.
+    /// Creates the response of a gait from rollouts with random images.
     pub(crate) fn new(
         id: &str,
         gait: &Gait,
@@ -297,7 +294,7 @@ impl ResponseFile {
     /// Reads a file.
     ///
     /// # Errors
-    /// What is wrong with the file, with its line and key.
+    /// Returns an error, with its line and key, if the file is missing or invalid.
     pub fn read(path: &Path) -> Result<Self, Error> {
         results::read(path, Some("response"))
     }
@@ -311,9 +308,9 @@ impl ResponseFile {
         ResponseFile::read(path).map_err(told).ok()
     }
 
-    /// The displacements of a gait under the first random images of a seed, if they were measured for
-    /// the run with this SHA-256, by this version, under these conditions; also those of a
-    /// measurement that was stopped. And how many of them are of one that ended.
+    /// Returns the known displacements of a gait under the first random images of a seed, and how
+    /// many of them are of a finished measurement. They count only for the run with this SHA-256,
+    /// this version and these conditions; stopped measurements count, too.
     pub(crate) fn known(
         &self,
         run_sha256: &str,
@@ -332,7 +329,7 @@ impl ResponseFile {
         (if begun.len() > ended.len() { begun } else { ended }, ended.len())
     }
 
-    /// Whether it was measured for the run with this SHA-256, by this version, under these
+    /// Returns true if it was measured for the run with this SHA-256, by this version, under these
     /// conditions and random images.
     fn is_of(&self, run_sha256: &str, seed: u64, conditions: &[Condition]) -> bool {
         let by_this = self.program_version == env!("CARGO_PKG_VERSION");
@@ -340,8 +337,8 @@ impl ResponseFile {
         self.run_sha256 == run_sha256 && by_this && *own == seed && shown == conditions
     }
 
-    /// With the other robots of an earlier file, if that holds for the same run, seed and conditions;
-    /// what these could be taught is left out if it was another task.
+    /// Adds the other robots of an earlier file about the same run, seed and conditions. It drops
+    /// estimates for another task.
     pub(crate) fn with_others_of(&self, earlier: &ResponseFile) -> Self {
         let mut all = self.clone();
         if earlier.is_of(&self.run_sha256, self.setting.seed, &self.setting.conditions) {
@@ -359,13 +356,13 @@ impl ResponseFile {
         all
     }
 
-    /// Its text: the head on one line, then one line per robot.
+    /// Encodes the file as JSON: the head on one line, then one line per robot.
     pub fn to_json(&self) -> String {
         let head = ResponseFile { robots: Vec::new(), ..self.clone() };
         by_lines(&head, &self.robots)
     }
 
-    /// `response.csv`: a line per robot and place.
+    /// Encodes `response.csv`: a line per robot and place.
     pub fn to_csv(&self) -> Vec<u8> {
         let rows = self.robots.iter().flat_map(|robot| {
             robot.places.iter().map(|Place { row, column, slope, error }| {
@@ -376,18 +373,17 @@ impl ResponseFile {
         table::csv(["id", "row", "column", "material", "slope", "error"], rows)
     }
 
-    /// Writes it, and its CSV beside it. Before it says anything new, `outdated` pictures go: they will
-    /// be drawn anew.
+    /// Writes the file, and its CSV beside it. If the results have changed, it first removes the
+    /// `outdated` pictures, to be redrawn.
     ///
     /// # Errors
-    /// If they cannot be written.
+    /// Returns an error if a file cannot be written.
     pub fn write(&self, path: &Path, outdated: &[[PathBuf; 2]]) -> Result<(), Error> {
         write_with_table(path, &self.to_json(), &self.to_csv(), outdated.iter().flatten().cloned())
     }
 }
 
-/// The pictures of robots beside results in `out`, as SVG and as PNG; of one robot they have the
-/// results' name.
+/// Returns the SVG and PNG paths of robots' pictures beside `out`; one robot alone has its stem.
 pub fn pictures(out: &Path, ids: &[&str]) -> Vec<[PathBuf; 2]> {
     let stem = out.file_stem().expect("its name was checked before anything was measured").to_string_lossy();
     let named = |id: &&str| match ids.len() {

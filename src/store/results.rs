@@ -1,5 +1,4 @@
-//! Reads and writes JSON files of ours: one reader for all of them; a table beside results, and
-//! long lists line by line.
+//! Reads and writes morphcog's JSON files, with tables beside results and long lists line by line.
 
 use crate::base::error::Error;
 use crate::base::files::{read_bytes, write_atomically};
@@ -14,25 +13,25 @@ use serde::de::DeserializeOwned;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Why results are always JSON.
+/// The reason why results are always valid JSON.
 const JSON: &str = "numbers are finite and keys are text: JSON has all of it";
 
-/// A JSON file of ours. Its fields name the [ranges](crate::base::ranges) of their numbers.
+/// A JSON file of morphcog. Its fields name the [ranges](crate::base::ranges) of their numbers.
 pub(crate) trait Stored: DeserializeOwned {
-    /// What the file calls itself, and the newest version of its schema that can be read.
+    /// The `format` of the file, and the newest version of its schema that can be read.
     const FORMAT: (&'static str, u32);
 
-    /// Checks what types cannot: that counts go together.
+    /// Checks what types cannot, such as counts that must agree.
     ///
     /// # Errors
-    /// What is wrong with it; the error names the key.
+    /// Returns an error that names the key.
     fn check(&self) -> Result<(), Error>;
 }
 
 /// Reads a file; `maker` is the command that makes one if there is none.
 ///
 /// # Errors
-/// What is wrong with the file, with its line or key.
+/// Returns an error, with its line or key, if the file is missing or invalid.
 pub(crate) fn read<T: Stored>(path: &Path, maker: Option<&'static str>) -> Result<T, Error> {
     let text = read_text(path).map_err(|error| match maker {
         Some(command) => Error::reading_or(path, &error, Remedy::Run(Invocation::new(command), "makes one")),
@@ -41,21 +40,21 @@ pub(crate) fn read<T: Stored>(path: &Path, maker: Option<&'static str>) -> Resul
     parse(&text, &path.display().to_string())
 }
 
-/// Reads the text of a file; `name` stands in messages.
+/// Parses the text of a file; `name` appears in messages.
 ///
 /// # Errors
-/// As of [`read`].
+/// Returns the errors of [`read`].
 pub(crate) fn parse<T: Stored>(text: &str, name: &str) -> Result<T, Error> {
     let file: T = reading::read_versioned(text, name, T::FORMAT.0, T::FORMAT.1)?;
     file.check().map(|()| file).map_err(|error| error.in_place(name))
 }
 
-/// Reads what results are about to replace, if it is there.
+/// Reads the file that results are about to replace, if it exists.
 ///
 /// # Errors
-/// If it cannot be read: nobody knows what would be lost.
+/// Returns an error if it cannot be read, because nobody knows what would be lost.
 pub(crate) fn replaced<T: Stored>(path: &Path) -> Result<Option<T>, Error> {
-    // A device or a pipe takes whatever is written to it.
+    // A device or a pipe accepts whatever is written to it.
     if !path.is_file() {
         return Ok(None);
     }
@@ -63,8 +62,7 @@ pub(crate) fn replaced<T: Stored>(path: &Path) -> Result<Option<T>, Error> {
     read(path, None).map(Some).map_err(|error| refuse(error).remedy(Remedy::ChooseOut))
 }
 
-/// The text of an object whose last key is a list: the head on one line, with an empty list there,
-/// then a line for each of the list.
+/// Encodes an object whose last key is a list: the head on one line, then a line for each item.
 pub(crate) fn by_lines(head: &impl Serialize, list: &[impl Serialize]) -> String {
     let head = serde_json::to_string(head).expect(JSON);
     let head = head.strip_suffix("]}").expect("the last key of the head is an empty list");
@@ -72,9 +70,8 @@ pub(crate) fn by_lines(head: &impl Serialize, list: &[impl Serialize]) -> String
     format!("{head}\n{}\n]}}\n", lines.join(",\n"))
 }
 
-/// Sets the file at a path aside, with the table beside it, if results are about to be written there
-/// that it is not about: under its own name and the beginning of its SHA-256. `is_same` says whether
-/// it is about the same.
+/// Moves an unrelated file, with its table, out of the way of results: under its own name and the
+/// beginning of its SHA-256. `is_same` returns true if the file is about the same as the results.
 ///
 /// # Errors
 /// If it cannot be read or renamed.
@@ -105,12 +102,12 @@ pub(crate) fn make_room(path: &Path, is_same: impl FnOnce() -> bool, session: &S
     Ok(())
 }
 
-/// Writes results, and their table beside them with the ending `csv`. The results are written last: if
-/// the process is killed in between, those of before are still there, and are made again. `figures` of
-/// the results of before go first: they will be drawn anew.
+/// Writes results, and their table beside them with the extension `csv`. The results are written
+/// last: if the process is killed in between, the old ones remain and are replaced later. If
+/// results change, it first removes their old `figures`, to be redrawn.
 ///
 /// # Errors
-/// If one of them cannot be written or removed.
+/// Returns an error if a file cannot be written or removed.
 pub(crate) fn write_with_table(
     path: &Path,
     json: &str,
@@ -147,7 +144,7 @@ mod tests {
     use crate::store::validation::ValidationFile;
     use serde_json::Value;
 
-    /// Reads the text of a file by its name; its error, if it is refused.
+    /// Parses the text of a file by its name; returns the error if it is refused.
     fn refusal(name: &str, text: &str) -> Option<Error> {
         fn of<T: Stored>(text: &str, name: &str) -> Option<Error> {
             parse::<T>(text, name).err()
@@ -165,7 +162,7 @@ mod tests {
         }
     }
 
-    /// The path of every JSON file that ships with the program or lies in the repository.
+    /// Returns the path of every JSON file that ships with the program or lies in the repository.
     fn shipped() -> Vec<PathBuf> {
         let mut folders = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("data")];
         let mut found = Vec::new();
@@ -199,7 +196,7 @@ mod tests {
         }
     }
 
-    /// The smallest file of each kind that ships, and one of a training.
+    /// Returns the smallest shipped file of each kind, and one of a training.
     fn samples() -> Vec<(String, Value)> {
         let mut smallest = std::collections::BTreeMap::<String, String>::new();
         for path in shipped().iter().filter(|path| path.extension().is_some_and(|ending| ending == "json")) {
@@ -215,7 +212,7 @@ mod tests {
         smallest.into_iter().map(|(name, text)| (name, serde_json::from_str(&text).unwrap())).collect()
     }
 
-    /// The place of a number of every kind in a value: of lists, those of the first item.
+    /// Finds a number of every kind in a value; in lists, in the first item.
     fn numbers(value: &Value, at: &str, found: &mut Vec<String>) {
         match value {
             Value::Number(_) => found.push(at.to_string()),
@@ -235,7 +232,7 @@ mod tests {
             assert_eq!(refusal(&name, &sample.to_string()).map(|error| error.message), None, "{name}");
             let mut places = Vec::new();
             numbers(&sample, "", &mut places);
-            // A setting may be endless, as the seconds between two checkpoints.
+            // A setting may be infinite, such as the seconds between two checkpoints.
             places.retain(|place| !place.starts_with("/config/"));
             assert!(places.len() >= 2, "{name}: {places:?}");
             for place in places {
@@ -245,7 +242,7 @@ mod tests {
                     let error = refusal(&name, &changed.to_string());
                     let error = error.unwrap_or_else(|| panic!("{name}: {place} = {number} is taken"));
                     assert!(error.message.starts_with(&format!("{name}:")), "{place}: {error}");
-                    // The key, or the section that it is in.
+                    // The key, or the section that contains it.
                     let mut keys =
                         place.split('/').filter(|key| !key.is_empty() && key.parse::<u8>().is_err());
                     assert!(keys.any(|key| error.message.contains(key)), "{place}: {error}");
@@ -315,7 +312,7 @@ mod tests {
         std::fs::write(&figure, "drawn").unwrap();
         write_with_table(&json, "{}", b"a", [figure.clone()]).unwrap();
         assert!(figure.exists());
-        // Where the table cannot be written the results of before stay, so that it is made again.
+        // If the table cannot be written the old results remain, so that they are made again.
         std::fs::remove_file(&csv).unwrap();
         std::fs::create_dir(&csv).unwrap();
         assert!(write_with_table(&json, "{ }", b"b", []).is_err());

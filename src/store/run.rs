@@ -1,5 +1,4 @@
-//! `run.json`: a run's archive with everything that made it; the file that `eval` and `replay`
-//! read.
+//! `run.json`: a run's archive with everything that made it. Commands such as `eval` read it.
 
 use crate::base::error::Error;
 use crate::base::hash::sha256_hex;
@@ -26,45 +25,45 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// What `run.json` calls itself.
+/// The `format` of `run.json`.
 pub const FORMAT: &str = "morphcog-run";
-/// Version of its schema; a reader refuses newer ones.
+/// The newest version of its schema; a reader refuses newer ones.
 pub const FORMAT_VERSION: u32 = 1;
 
-/// What stands for a run.
+/// The arguments that stand for a run.
 const WHAT_RUNS: &str = "expected a run.json, its folder, or runs that ship, such as gallery:zero_one";
 
-/// A robot: a genome, its body, and what it did on the training images.
+/// A robot: a genome, its body, and its walks under the training images.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Robot {
-    /// Content hash of the genome: a letter and nine hexadecimal digits (ten in older files).
+    /// The content hash of the genome: a letter and nine hexadecimal digits (ten in older files).
     pub id: String,
-    /// Its cell, one bin per dimension of the archive.
+    /// The cell, one bin per dimension of the archive.
     pub cell: Vec<usize>,
-    /// The task it performs, as "0|123": classes before the bar walk one way, the others the other.
+    /// The task, such as "0|123": classes before the bar walk one way, the others the other.
     pub task: String,
-    /// Its fitness, in the fitness's [unit](crate::task::fitness::Fitness::unit).
+    /// The fitness, in the fitness's [unit](crate::task::fitness::Fitness::unit).
     #[serde(deserialize_with = "ranges::number")]
     pub objective: f64,
-    /// Displacement under each training image, voxel lengths, right positive; with `response` those
-    /// of its probe under as many random images.
+    /// The displacement under each training image, voxel lengths, positive to the right. With
+    /// `response` it is the probe's, under as many random images.
     #[serde(deserialize_with = "ranges::number")]
     pub displacements: Vec<f64>,
-    /// Its voxels by kind.
+    /// The voxel counts by kind.
     pub voxels: VoxelCounts,
-    /// Generation it was born in.
+    /// The generation in which it was born.
     pub generation: u64,
-    /// Id of its parent; none for a random individual.
+    /// The id of its parent; null for a random individual.
     pub parent: Option<String>,
-    /// Its body.
+    /// The body.
     pub body: Body,
-    /// Its genome.
+    /// The genome.
     pub genome: Genome,
 }
 
 impl Robot {
-    /// Bins of its three voxel counts.
+    /// Returns the bins of its three voxel counts.
     pub fn bins(&self) -> Vec<usize> {
         let area = self.body.voxels().area();
         let VoxelCounts { muscle, sensor, total, .. } = self.voxels;
@@ -72,25 +71,25 @@ impl Robot {
     }
 }
 
-/// Dimensions of an archive.
+/// The dimensions of an archive.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Dimensions {
-    /// Names: muscle, sensor, total, and with several tasks, task.
+    /// The names: muscle, sensor, total, and with several tasks, task.
     pub names: Vec<String>,
-    /// Number of bins of each.
+    /// The number of bins of each.
     pub bins: Vec<usize>,
-    /// Cells that a body can have at all: what coverage is a fraction of.
+    /// The number of cells that a body can have; coverage is a fraction of it.
     pub possible_cells: usize,
-    /// Names of the tasks, in the order of their bins.
+    /// The names of the tasks, in the order of their bins.
     pub tasks: Vec<String>,
 }
 
 impl Dimensions {
-    /// Those of the archive of a config.
+    /// Returns the dimensions of a config's archive.
     ///
     /// # Errors
-    /// If the config has no tasks.
+    /// Returns an error if the config has no tasks.
     pub fn of(config: &Config) -> Result<Self, Error> {
         let grouping = config.grouping()?;
         let tasks: Vec<String> = grouping.tasks().iter().map(|split| split.name()).collect();
@@ -106,17 +105,17 @@ impl Dimensions {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RunFile {
-    /// "morphcog-run".
+    /// The constant "morphcog-run".
     #[schemars(extend("const" = FORMAT))]
     pub format: String,
-    /// Version of this schema.
+    /// The version of this schema.
     #[schemars(range(min = 1, max = FORMAT_VERSION))]
     pub format_version: u32,
-    /// Version of morphcog that wrote it.
+    /// The version of morphcog that wrote the file.
     pub program_version: String,
-    /// Name of the run: its config's.
+    /// The name of the run, from its config.
     pub name: String,
-    /// The config, every key resolved; the physics are in it.
+    /// The config with every key resolved, including the physics.
     pub config: Config,
     /// The data.
     pub dataset: DatasetRef,
@@ -124,17 +123,16 @@ pub struct RunFile {
     pub training_images: Vec<ImageRef>,
     /// The archive's dimensions.
     pub dimensions: Dimensions,
-    /// The run whose gaits it was trained from, if it was.
+    /// The run whose gaits were trained, if this is a training.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub origin: Option<Origin>,
-    /// Generations done.
+    /// The number of generations completed.
     pub generations: u64,
-    /// Figures of the archive.
+    /// The statistics of the archive.
     pub stats: ArchiveStats,
     /// The elites, in the order of their cells.
     pub elites: Vec<Robot>,
-    /// SHA-256 of the bytes of the file that it was read from; none of a run that was not read from
-    /// its file.
+    /// The SHA-256 of the bytes of the file; `None` if the run was not read from its file.
     #[serde(skip)]
     pub read_sha256: Option<String>,
 }
@@ -162,7 +160,7 @@ impl Stored for RunFile {
         }
         let shown: BTreeSet<u8> = self.training_images.iter().map(|image| image.label).collect();
         let classes: BTreeSet<u8> = self.config.classes().into_iter().collect();
-        // Older trainings may end without an image of every class, but have some of both groups.
+        // Older trainings may lack images of a class, but have some of both groups.
         let are_enough = match (&self.origin, &self.config.task.groups) {
             (Some(_), Some(groups)) => {
                 shown.is_subset(&classes)
@@ -212,14 +210,14 @@ impl RunFile {
     /// Reads `run.json`.
     ///
     /// # Errors
-    /// What is wrong with the file, with its line and key.
+    /// Returns an error, with its line and key, if the file is missing or invalid.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text =
             read_text(path).map_err(|error| Error::reading_or(path, &error, Remedy::advice(WHAT_RUNS)))?;
         RunFile::parse(&text, &path.display().to_string())
     }
 
-    /// Generations done and asked for, if the file says them; nothing else of it is read.
+    /// Reads only the generations completed and requested, if the file contains them.
     pub fn progress(path: &Path) -> Option<(u64, u64)> {
         #[derive(Deserialize)]
         struct Whole {
@@ -234,8 +232,7 @@ impl RunFile {
         Some((run.generations, run.config.generations))
     }
 
-    /// The version of morphcog that made a run, if it is another than this and the file says it;
-    /// nothing else of it is read.
+    /// Reads only the version of morphcog that made a run; returns it if it is not this one.
     pub fn other_version(path: &Path) -> Option<String> {
         #[derive(Deserialize)]
         struct Made {
@@ -245,10 +242,10 @@ impl RunFile {
         Some(run.program_version).filter(|version| version != env!("CARGO_PKG_VERSION"))
     }
 
-    /// Reads its text; `name` stands in messages.
+    /// Parses the text of the file; `name` appears in messages.
     ///
     /// # Errors
-    /// As [`RunFile::read`].
+    /// Returns the errors of [`RunFile::read`].
     pub fn parse(text: &str, name: &str) -> Result<Self, Error> {
         let run: RunFile = results::parse(text, name)?;
         Ok(RunFile { read_sha256: Some(sha256_hex(text.as_bytes())), ..run })
@@ -259,38 +256,37 @@ impl RunFile {
         DescriptorSpace::new(names.iter().cloned().zip(bins.iter().copied()).collect())
     }
 
-    /// How its elites' answers were judged.
+    /// Returns the fitness function of its elites.
     pub fn fitness(&self) -> Fitness {
         self.config.evaluation.fitness
     }
 
-    /// A fitness for people, with its unit.
+    /// Formats a fitness with its unit.
     pub fn in_units(&self, objective: f64) -> String {
         let unit = self.fitness().unit().map_or(String::new(), |unit| format!(" {unit}"));
         format!("{}{unit}", number::fixed(objective, 2))
     }
 
-    /// Whether both are of one run, however far it had got: the same config and seed make the same
-    /// robots. Trainings have gaits of their own besides.
+    /// Returns true if both are states of one run: the same config and seed give the same robots.
+    /// Trainings also have gaits of their own.
     fn is_same_run(&self, other: &RunFile) -> bool {
         let essence = |run: &RunFile| (run.config.essence(), run.dataset.clone());
         let are_evolved = self.origin.is_none() && other.origin.is_none();
         self.fingerprint() == other.fingerprint() || are_evolved && essence(self) == essence(other)
     }
 
-    /// Its fittest elite; of equals the one in the first cell.
+    /// Returns the fittest elite, or the one in the first cell if several are equal.
     pub fn best(&self) -> Option<&Robot> {
         let fitter = |best: &&Robot, robot: &&Robot| robot.objective > best.objective;
         self.elites.iter().reduce(|best, robot| if fitter(&best, &robot) { robot } else { best })
     }
 
-    /// What an elite answered to the training images.
+    /// Returns an elite's answers to the training images.
     pub fn answers(&self, robot: &Robot) -> Vec<Answer> {
         answers(&self.training_images, robot.displacements.iter().copied().map(Some))
     }
 
-    /// What the walks of a robot say; none of a gait, or of a robot that is to walk the same way
-    /// always.
+    /// Returns the judge of a robot's walks, or `None` for a gait or a robot of the same-way task.
     pub fn judge(&self, robot: &Robot) -> Option<Judge> {
         if self.config.measures_response() {
             return None;
@@ -300,16 +296,16 @@ impl RunFile {
         Judge::of(split, Assignment::from_training(split, self.fitness(), &self.answers(robot)))
     }
 
-    /// Whether its displacements are those of its bodies under the training images as the config's
-    /// protocol has them: not of probes, nor from raised starts or without length limits.
+    /// Returns true if displacements are those of bodies under the training images by the config's
+    /// protocol: not of probes, nor from raised starts or without length limits.
     pub fn follows_protocol(&self) -> bool {
         !self.config.measures_response() && self.origin.is_none()
     }
 
-    /// The elites as an archive to go on with.
+    /// Returns the elites as an archive, to continue the run.
     ///
     /// # Errors
-    /// If two elites are in one cell.
+    /// Returns an error if two elites are in one cell.
     pub fn archive(&self) -> Result<Archive<Robot>, Error> {
         let space = self.space();
         let mut archive = Archive::new();
@@ -325,19 +321,19 @@ impl RunFile {
         Ok(archive)
     }
 
-    /// Its text: the head on one line, then one line per elite.
+    /// Encodes the file as JSON: the head on one line, then one line per elite.
     pub fn to_json(&self) -> String {
         let head = RunFile { elites: Vec::new(), ..self.clone() };
         by_lines(&head, &self.elites)
     }
 
-    /// What identifies it: SHA-256 of the bytes of its file, or of those that would be written, in
-    /// hexadecimal digits.
+    /// Returns the identity of the run: the SHA-256 of its file's bytes, or of those to be written,
+    /// in hexadecimal digits.
     pub fn fingerprint(&self) -> String {
         self.read_sha256.clone().unwrap_or_else(|| sha256_hex(self.to_json().as_bytes()))
     }
 
-    /// `elites.csv`: what pyribs' `ArchiveDataFrame` reads. `index`: cell; `objective`;
+    /// Encodes `elites.csv` for pyribs' `ArchiveDataFrame`. `index`: cell; `objective`;
     /// `measures_i`: voxel counts (and task); `solution_i`: voxels row-major; then id, task,
     /// generation and displacements.
     pub fn to_csv(&self) -> Vec<u8> {
@@ -364,10 +360,10 @@ impl RunFile {
     }
 }
 
-/// Whether runs, each with its path, are different ones: the same twice would count twice.
+/// Checks that runs, each with its path, differ, because duplicates would count twice.
 ///
 /// # Errors
-/// Which are the same.
+/// Returns an error that names two equal runs.
 pub fn different<'a>(runs: impl IntoIterator<Item = (&'a Path, &'a RunFile)>) -> Result<(), Error> {
     let mut known: Vec<(&Path, &RunFile)> = Vec::new();
     for (path, run) in runs {
@@ -427,16 +423,15 @@ mod tests {
         run.elites.iter_mut().for_each(|robot| robot.id = robot.genome.id());
         let text = run.to_json();
         let read = |text: &str| RunFile::parse(text, "run.json").unwrap();
-        // The text is the file's, so its fingerprint is known without reading it again.
+        // The file has this text, so its fingerprint is known without another reading.
         assert_eq!(read(&text).fingerprint(), run.fingerprint());
-        // What says the same in other bytes is another file, and its hash is the one that sha256sum
-        // says.
+        // The same content in other bytes is another file, with the hash that sha256sum computes.
         for other in [text.replace("1.5", "1.50"), format!("{text}\n"), format!("\u{feff}{text}")] {
             assert_ne!(other, text);
             assert_eq!(read(&other).to_json(), text);
             assert_eq!(read(&other).fingerprint(), sha256_hex(other.as_bytes()));
         }
-        // But no other run.
+        // But it is the same run.
         let twice = [(Path::new("a.json"), &read(&text)), (Path::new("b.json"), &read(&format!("{text}\n")))];
         assert!(different(twice).is_err());
     }

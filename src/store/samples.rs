@@ -1,4 +1,4 @@
-//! Runs made up for tests.
+//! Synthetic runs for tests.
 
 use crate::base::random::{Purpose, stream};
 use crate::config::{BUILT_IN, Config};
@@ -7,8 +7,7 @@ use crate::qd::Archive;
 use crate::store::images::{DatasetRef, ImageRef};
 use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
 
-/// A run of the quick-start config with robots of these ids and objectives, each in a cell of its
-/// own.
+/// Creates a quick-start run with robots of these ids and objectives, each in its own cell.
 pub fn run(robots: &[(&str, f64)]) -> RunFile {
     let config = Config::parse(BUILT_IN[0].1, BUILT_IN[0].0, &[]).unwrap();
     let image = |label| ImageRef { index: usize::from(label), label };
@@ -45,7 +44,7 @@ pub fn run(robots: &[(&str, f64)]) -> RunFile {
     };
     let stats =
         |archive: Archive<Robot>| archive.stats(run.dimensions.possible_cells, run.config.archive.qd_offset);
-    // Robots that no archive can hold are for tests of what refuses them.
+    // Some tests need robots that no archive can hold.
     let stats = run.archive().map_or(run.stats, stats);
     RunFile { stats, ..run }
 }

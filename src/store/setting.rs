@@ -1,4 +1,4 @@
-//! What evaluations say of the runs they are of: enough to show others the same images.
+//! The settings that evaluations record about their runs, enough to reproduce the images.
 
 use crate::base::error::Error;
 use crate::config::evaluation::EvaluationConfig;
@@ -18,36 +18,36 @@ use crate::task::stimulus::StimulusParams;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A run that robots are from.
+/// A run that contributed robots.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RunRef {
-    /// Its name.
+    /// The name of the run.
     pub name: String,
-    /// Its seed.
+    /// The seed of the run.
     pub seed: u64,
-    /// Generations it had done.
+    /// The number of generations completed.
     pub generations: u64,
-    /// The images it was trained on last.
+    /// The images of its last training.
     pub training_images: Vec<ImageRef>,
-    /// SHA-256 of its content.
+    /// The SHA-256 of its content.
     pub sha256: String,
-    /// How `--archive` names it, if it has a name and no path.
+    /// The name for `--archive`, if the run has a name in place of a path.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub archive: Option<String>,
 }
 
-/// What networks need to know to be given the same images as the robots.
+/// The settings that give networks the same images as the robots.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Setting {
-    /// Rows and columns of a stimulus.
+    /// The rows and columns of a stimulus.
     pub body: BodyConfig,
     /// The classes and their groups.
     pub task: TaskConfig,
     /// The data.
     pub data: DataConfig,
-    /// From image to stimulus.
+    /// The conversion from image to stimulus.
     pub stimulus: StimulusParams,
-    /// SHA-256 of the training split.
+    /// The SHA-256 of the training split.
     pub train_sha256: String,
 }
 
@@ -76,7 +76,7 @@ impl Setting {
         }
     }
 
-    /// Checks what a type cannot: all that is here stands in a config, which must be valid.
+    /// Checks what types cannot: everything here is part of a config, which must be valid.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let config = Config {
             seed: 1,

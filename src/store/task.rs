@@ -1,4 +1,4 @@
-//! `task.json`: how far a task of a sweep is, in its run folder.
+//! `task.json`: the state of a sweep's task, in its run folder.
 
 use crate::base::error::Error;
 use crate::base::files::write_atomically;
@@ -8,21 +8,21 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::Path;
 
-/// What the file calls itself.
+/// The `format` of the file.
 pub const FORMAT: &str = "morphcog-task";
 
-/// Version of its schema.
+/// The version of its schema.
 pub const FORMAT_VERSION: u32 = 1;
 
-/// How far a task is.
+/// The state of a task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum State {
-    /// All its steps are done.
+    /// All steps are done.
     Done,
-    /// A process began with it, and has not said that it ended.
+    /// A process began it, and has not reported its end.
     Running,
-    /// It began, and no process is at it; the same command goes on.
+    /// It began, and no process works on it; the same command continues it.
     Stopped,
     /// It failed.
     Failed,
@@ -31,10 +31,10 @@ pub enum State {
 }
 
 impl State {
-    /// All of them.
+    /// All states.
     pub const ALL: [State; 5] = [State::Done, State::Running, State::Stopped, State::Failed, State::Waiting];
 
-    /// What it is called.
+    /// Returns the name of the state.
     pub fn name(self) -> &'static str {
         match self {
             State::Done => "done",
@@ -54,23 +54,22 @@ pub struct TaskFile {
     pub format: String,
     /// [`FORMAT_VERSION`].
     pub format_version: u32,
-    /// Version of the program that wrote it.
+    /// The version of the program that wrote the file.
     pub program_version: String,
-    /// Everything that the run depends on: keys in dots, with their values.
+    /// Everything that the run depends on: dotted keys with their values.
     pub settings: Settings,
-    /// What is asked for beyond that, and may change: generations or challengers, validation, steps
-    /// after the run.
+    /// Requests that may change: generations or challengers, validation, steps after the run.
     pub asked: Value,
-    /// How far it is.
+    /// The state of the task.
     pub state: State,
-    /// What it failed with.
+    /// The error of a failed task.
     pub error: Option<String>,
-    /// Wall-clock time of all sessions that ended by themselves or by a signal \[s\].
+    /// The wall-clock time of all sessions that ended by themselves or by a signal \[s\].
     pub seconds: f64,
 }
 
 impl TaskFile {
-    /// Of a task that begins.
+    /// Creates the file of a task that begins.
     pub fn new(settings: Settings, asked: Value) -> Self {
         TaskFile {
             format: FORMAT.to_string(),
@@ -84,10 +83,10 @@ impl TaskFile {
         }
     }
 
-    /// Reads it; `None` if there is none.
+    /// Reads the file, or returns `None` if there is none.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// Returns an error if it is invalid.
     pub fn read(path: &Path) -> Result<Option<Self>, Error> {
         let text = match read_text(path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
@@ -99,10 +98,10 @@ impl TaskFile {
             .map_err(|error| error.advice("delete it: its task goes on from its run"))
     }
 
-    /// Writes it.
+    /// Writes the file.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// Returns an error if it cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
         let text = serde_json::to_string(self).expect("keys are text and numbers are finite") + "\n";
         write_atomically(path, text.as_bytes()).map_err(|error| Error::writing(path, &error))

@@ -1,4 +1,4 @@
-//! `team.json` and `team.csv`: what robots of several runs answer together.
+//! `team.json` and `team.csv`: the joint answers of robots of several runs.
 
 use crate::analysis::votes::{Accuracy, Ballot};
 use crate::base::error::Error;
@@ -17,63 +17,63 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What `team.json` calls itself.
+/// The `format` of `team.json`.
 pub const FORMAT: &str = "morphcog-team";
-/// Version of its schema.
+/// The newest version of its schema.
 pub const FORMAT_VERSION: u32 = 1;
 
-/// Names of the figures beside it: the confusion matrix, and the poster of all bodies.
+/// The names of the figures beside it: the confusion matrix, and the poster of all bodies.
 pub const FIGURES: [&str; 2] = ["confusion", "bodies"];
 
-/// The files of a figure beside results in `out`, as SVG and as PNG.
+/// Returns the files of a figure beside results in `out`, as SVG and as PNG.
 pub fn figure(out: &Path, name: &str) -> [PathBuf; 2] {
     let stem = out.file_stem().unwrap_or_default().to_string_lossy();
     ["svg", "png"].map(|ending| out.with_file_name(format!("{stem}-{name}.{ending}")))
 }
 
-/// Most cycles that an image is shown for: as many as the longest rollout has by default.
+/// The maximum number of cycles per image: the default of the longest rollout.
 const MOST_CYCLES: u32 = MAX_STEPS / 50;
 
 /// The content of `team.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TeamFile {
-    /// "morphcog-team".
+    /// The constant "morphcog-team".
     #[schemars(extend("const" = FORMAT))]
     pub format: String,
-    /// Version of this schema.
+    /// The version of this schema.
     #[schemars(range(min = 1, max = FORMAT_VERSION))]
     pub format_version: u32,
-    /// Version of morphcog that wrote it.
+    /// The version of morphcog that wrote the file.
     pub program_version: String,
-    /// The classes that are told apart, in order.
+    /// The classes to tell apart, in order.
     pub classes: Vec<u8>,
-    /// Name of the dataset.
+    /// The name of the dataset.
     pub dataset: String,
-    /// SHA-256 of its test split.
+    /// The SHA-256 of its test split.
     pub test_sha256: String,
-    /// Which images: those of the test split, or validation images.
+    /// The split of the images: test, or validation.
     pub split: HeldOut,
-    /// Seed by which they were drawn.
+    /// The seed of the drawn images.
     pub seed: u64,
-    /// Walks up to this give no vote \[voxel lengths\].
+    /// The walk up to which a robot gives no vote \[voxel lengths\].
     #[serde(deserialize_with = "ranges::size")]
     pub threshold: f64,
-    /// Walks count up to this in sums \[voxel lengths\].
+    /// The walk up to which distances count in sums \[voxel lengths\].
     #[serde(deserialize_with = "ranges::size")]
     pub clip: f64,
-    /// Actuation cycles per image, each image a fresh rollout.
+    /// The number of actuation cycles per image, each image a fresh rollout.
     pub cycles: u32,
     /// The images.
     pub images: Vec<ImageRef>,
-    /// Robots of the team, those that have been shown the images.
+    /// The robots evaluated so far.
     pub members: Vec<Member>,
-    /// How many robots the team has; more than `members` if it was stopped.
+    /// The size of the team; larger than `members` if it was stopped.
     pub size: usize,
-    /// What they answer together; none if it was stopped.
+    /// The joint answers; absent if it was stopped.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub answers: Option<Answers>,
-    /// What answers the same images without bodies, or with one; none if it was stopped.
+    /// The baselines on the same images without bodies, or with one; absent if it was stopped.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub baselines: Option<TeamBaselines>,
 }
@@ -82,45 +82,45 @@ pub struct TeamFile {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Member {
-    /// Its id.
+    /// The id of the robot.
     pub id: String,
-    /// Name of its run.
+    /// The name of its run.
     pub run: String,
-    /// SHA-256 of its run.json.
+    /// The SHA-256 of its run.json.
     pub run_sha256: String,
-    /// Its task.
+    /// The task of the robot.
     pub task: String,
-    /// Classes of the two groups.
+    /// The classes of the two groups.
     pub groups: [Vec<u8>; 2],
-    /// Which way the first group is to walk: "left" or "right", as on the training images.
+    /// The direction of the first group on the training images: "left" or "right".
     pub first_group_walks: String,
-    /// Its body.
+    /// The body.
     pub body: Body,
-    /// How it answers the images of its own classes.
+    /// The accuracy on the images of its own classes.
     pub own: Accuracy,
-    /// Share of all images under which it moved no farther than the threshold, or was unstable.
+    /// The share of all images under which it moved no farther than the threshold, or was unstable.
     #[serde(deserialize_with = "ranges::share")]
     pub not_moved: f64,
-    /// Displacement under each image \[voxel lengths\]; none if unstable.
+    /// The displacement under each image \[voxel lengths\]; null if unstable.
     #[serde(deserialize_with = "ranges::number")]
     pub displacements: Vec<Option<f64>>,
 }
 
-/// What a team answers, by both decoders.
+/// The answers of a team, by both decoders.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Answers {
-    /// Most votes.
+    /// The answers by most votes.
     pub votes: Decoded,
-    /// The largest sum of walks.
+    /// The answers by the largest sum of walks.
     pub walks: Decoded,
-    /// Share of images for which several classes had most votes.
+    /// The share of images for which several classes had most votes.
     #[serde(deserialize_with = "ranges::share")]
     pub ties: f64,
-    /// Mean over images: of the robots that know the answered class, the share that voted for it.
+    /// The share of the robots that know the answered class and voted for it, averaged over images.
     #[serde(deserialize_with = "ranges::share")]
     pub agreement: f64,
-    /// Mean number of robots that moved no farther than the threshold, or were unstable.
+    /// The mean number of robots that moved no farther than the threshold, or were unstable.
     #[serde(deserialize_with = "ranges::size")]
     pub not_moved: f64,
 }
@@ -129,34 +129,34 @@ pub struct Answers {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Decoded {
-    /// How many are correct.
+    /// The accuracy of the answers.
     pub accuracy: Accuracy,
-    /// Share answered correctly, by class.
+    /// The share answered correctly, by class.
     #[serde(deserialize_with = "ranges::share")]
     pub per_class: BTreeMap<u8, f64>,
-    /// Images by their class (rows) and by the answer (columns), both in the order of `classes`.
+    /// The number of images by class (rows) and answer (columns), both in the order of `classes`.
     pub confusion: Vec<Vec<usize>>,
     /// The answer to each image.
     pub answers: Vec<u8>,
 }
 
-/// Accuracies on the same images, and on the pixels that the robots see: all together, within the
-/// least of their margins, as the first robot sees them.
+/// Accuracies on the same images, from the pixels that the robots use together: within the smallest
+/// of their margins, by the first robot's stimulus.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TeamBaselines {
-    /// Training images that linear classifiers and the nearest neighbour know.
+    /// The number of training images for the linear classifiers and the nearest neighbour.
     pub training_images: usize,
     /// A linear function for each class against all others; the largest wins.
     pub linear_one_against_rest: Accuracy,
-    /// A linear function for each pair of classes, with votes as the team's; where a robot tells the
-    /// pair apart, on the pixels that it sees.
+    /// A linear function for each pair of classes, with votes like the team's. For a pair that a
+    /// robot tells apart, it uses the robot's pixels.
     pub linear_pairs: Accuracy,
     /// The class of the nearest training image.
     pub nearest_neighbour: Accuracy,
-    /// The best robot of the team by itself, with votes as the team's.
+    /// The best robot of the team by itself, with votes like the team's.
     pub best_body: Accuracy,
-    /// Its id.
+    /// The id of that robot.
     pub best_body_id: String,
 }
 
@@ -240,7 +240,7 @@ impl Stored for TeamFile {
 }
 
 impl Member {
-    /// What a walk of this robot to either side speaks for.
+    /// Returns the classes that a walk of this robot to either side votes for.
     pub fn judge(&self) -> Judge {
         let [a, b] = self.groups.clone();
         if self.first_group_walks == Direction::Left.name() {
@@ -250,8 +250,7 @@ impl Member {
         }
     }
 
-    /// A robot of a run that performs a task, with its displacements under images and what these
-    /// come to.
+    /// Creates a member from a run's robot and its displacements, with its accuracy.
     pub(crate) fn new(trial: &Trial, run_sha256: &str, displacements: Vec<Option<f64>>) -> Self {
         let Trial { run, robot, split, images, threshold } = *trial;
         let assignment = Assignment::from_training(split, run.fitness(), &run.answers(robot));
@@ -300,14 +299,14 @@ impl Decoded {
 }
 
 impl TeamFile {
-    /// What all walks under an image come to.
+    /// Counts the votes of all walks under an image.
     fn ballot(&self, sides: &[Judge], image: usize) -> Ballot {
         let walks =
             sides.iter().zip(&self.members).map(|(sides, member)| (sides, member.displacements[image]));
         Ballot::count(&self.classes, walks, self.threshold, self.clip)
     }
 
-    /// What the members answer together, of all images.
+    /// Returns the members' joint answers to all images.
     pub(crate) fn decided(&self) -> Answers {
         let sides: Vec<Judge> = self.members.iter().map(Member::judge).collect();
         let ballots: Vec<Ballot> = (0..self.images.len()).map(|image| self.ballot(&sides, image)).collect();
@@ -331,7 +330,7 @@ impl TeamFile {
         }
     }
 
-    /// The best robot by itself, with votes as the team's: its place, and how it does.
+    /// Returns the index and accuracy of the best robot by itself, with votes like the team's.
     pub(crate) fn best_body(&self) -> Option<(usize, Accuracy)> {
         let alone = |(place, member): (usize, &Member)| {
             let sides = member.judge();
@@ -341,7 +340,7 @@ impl TeamFile {
             };
             (place, Accuracy::of(self.images.iter().zip(&member.displacements).map(answer)))
         };
-        // The first of several that are as good.
+        // The first of several equal ones.
         self.members
             .iter()
             .enumerate()
@@ -352,22 +351,22 @@ impl TeamFile {
     /// Reads a team.json.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// Returns an error if the file is missing or invalid.
     pub fn read(path: &Path) -> Result<Self, Error> {
         results::read(path, Some("team"))
     }
 
-    /// Writes it, and its table beside it.
+    /// Writes the file, and its table beside it.
     ///
     /// # Errors
-    /// If a file cannot be written.
+    /// Returns an error if a file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
         let json = serde_json::to_string(self).expect("keys are text and numbers are finite") + "\n";
         let figures = FIGURES.iter().flat_map(|name| figure(path, name));
         write_with_table(path, &json, &self.to_csv(), figures)
     }
 
-    /// A row per image: its class, both answers, and how far each robot walked.
+    /// Encodes a row per image: its class, both answers, and each robot's displacement.
     fn to_csv(&self) -> Vec<u8> {
         let columns = ["index", "label", "by_votes", "by_walks"].map(str::to_string).into_iter();
         let columns =

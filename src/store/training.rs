@@ -1,5 +1,4 @@
-//! `training.json`: every rollout of a training, so that it goes on where it was stopped; and which
-//! run its gaits are from.
+//! `training.json`: every rollout of a training, to continue it; and the origin of its gaits.
 
 use crate::base::error::Error;
 use crate::base::hash::sha256_hex;
@@ -10,56 +9,55 @@ use crate::store::run::RunFile;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What the file calls itself, and the version of its schema.
+/// The `format` of the file, and the version of its schema.
 pub(crate) const FILE: (&str, u32) = ("morphcog-training", 2);
 
-/// The run whose gaits a robot was trained from, wherever that lay.
+/// The run whose gaits a robot was trained from, wherever that run was.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Origin {
-    /// Name of the run.
+    /// The name of the run.
     pub name: String,
-    /// Its generations.
+    /// The number of its generations.
     pub generations: u64,
-    /// SHA-256 of its file.
+    /// The SHA-256 of its file.
     pub sha256: String,
-    /// Indices of the images that its robots were ever trained on, if they are of the same data:
-    /// not for validation.
+    /// The indices of all images that its robots were ever trained on, if of the same data. They
+    /// are not for validation.
     pub trained_on: Vec<usize>,
-    /// The same of other data, run by run.
+    /// The images of other data that its robots were trained on, run by run.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub elsewhere: Vec<Elsewhere>,
-    /// How many windows of the images were tried, of which the run's config has the best; 0 if none
-    /// but the config's own.
+    /// The number of windows tried, the best of which is in the config; 0: only the config's own.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub windows: usize,
 }
 
-/// Which images of other data a run was trained on; those data need not be there.
+/// The training images of a run on other data; those data need not be available.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Elsewhere {
-    /// SHA-256 of the training images.
+    /// The SHA-256 of the training images.
     pub train_sha256: String,
-    /// Indices of those that the run was shown last, or that its gaits were trained on.
+    /// The indices of the run's last training images, and of those that its gaits were trained on.
     pub indices: Vec<usize>,
-    /// Those that it drew, if its config names none.
+    /// The images that it drew, if its config names none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub drawn: Option<Drawn>,
 }
 
-/// Images that were drawn.
+/// Images that were drawn at random.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Drawn {
-    /// Of these classes.
+    /// The classes.
     pub classes: Vec<u8>,
-    /// So many of each.
+    /// The number of images of each class.
     pub images_per_class: usize,
-    /// By this seed.
+    /// The seed.
     pub seed: u64,
 }
 
 impl Elsewhere {
-    /// What a run was trained on.
+    /// Returns the training images of a run.
     pub(crate) fn of(run: &RunFile) -> Self {
         let config = &run.config;
         let before = run.origin.iter().flat_map(|origin| origin.trained_on.iter().copied());
@@ -76,30 +74,29 @@ impl Elsewhere {
     }
 }
 
-/// Displacements that were simulated together, in the order of the images; `None` where unstable.
+/// Displacements that were simulated together, in the order of the images; `None` if unstable.
 pub type Batch = Vec<Option<f64>>;
 
 /// The content of `training.json`.
 #[derive(Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct File {
-    /// What it calls itself.
+    /// The `format` of the file.
     pub format: String,
-    /// Version of its schema.
+    /// The version of its schema.
     pub format_version: u32,
-    /// SHA-256 of all that the rollouts depend on.
+    /// The SHA-256 of everything that the rollouts depend on.
     pub key: String,
-    /// SHA-256 of `key` and `rollouts`, so that no damage changes what is trained. Files of version
-    /// 1 have none.
+    /// The SHA-256 of `key` and `rollouts`, to detect damage; absent in files of version 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub checksum: Option<String>,
-    /// Rollouts in the order in which they were asked for.
+    /// The rollouts in the order in which they were requested.
     #[serde(deserialize_with = "ranges::number")]
     pub rollouts: Vec<Batch>,
 }
 
 impl File {
-    /// The file of these rollouts, with its checksum.
+    /// Creates the file of these rollouts, with its checksum.
     pub(crate) fn new(key: String, rollouts: Vec<Batch>) -> Self {
         let (format, format_version) = (FILE.0.to_string(), FILE.1);
         let file = File { format, format_version, key, checksum: None, rollouts };

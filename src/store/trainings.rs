@@ -1,4 +1,4 @@
-//! Trainings of networks, kept beside the results so that none is done twice.
+//! Trainings of networks, kept beside the results so that none is repeated.
 
 use crate::base::error::Error;
 use crate::base::files::write_atomically;
@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What the file calls itself, and the version of its schema.
+/// The `format` of the file, and the version of its schema.
 const FORMAT: (&str, u32) = ("morphcog-trainings", 2);
 
-/// Known trainings.
+/// The known trainings.
 #[derive(Debug)]
 pub(crate) struct Trainings {
     path: PathBuf,
@@ -24,8 +24,8 @@ pub(crate) struct Trainings {
 struct Content {
     format: String,
     format_version: u32,
-    /// By all that the trainings depend on (a hash) and by size: accuracy and parameters of each training,
-    /// in order.
+    /// The accuracy and parameters of each training, in order, by a hash of everything that the
+    /// trainings depend on and by size.
     trainings: BTreeMap<String, BTreeMap<usize, Vec<(f64, usize)>>>,
 }
 
@@ -46,11 +46,11 @@ impl Stored for Content {
 }
 
 impl Trainings {
-    /// Those beside a result file: `capacity.trainings.json` beside `capacity.json`; none if there is
-    /// no such file.
+    /// Reads the trainings beside a result file: `capacity.trainings.json` beside `capacity.json`.
+    /// Without the file there are none.
     ///
     /// # Errors
-    /// If the file cannot be read: trainings in it would be lost.
+    /// Returns an error if the file cannot be read, because its trainings would be lost.
     pub fn read(results: &Path) -> Result<Self, Error> {
         let path = results.with_extension("trainings.json");
         let empty =
@@ -63,21 +63,21 @@ impl Trainings {
         Ok(Trainings { path, content })
     }
 
-    /// The trainings of a size: accuracy, parameters.
+    /// Returns the trainings of a size: accuracy, parameters.
     pub fn of(&self, key: &str, size: usize) -> &[(f64, usize)] {
         self.content.trainings.get(key).and_then(|sizes| sizes.get(&size)).map_or(&[], Vec::as_slice)
     }
 
-    /// Adds the next ones of a size.
+    /// Adds the next trainings of a size.
     pub fn extend(&mut self, key: &str, size: usize, trained: &[Trained]) {
         let sizes = self.content.trainings.entry(key.to_string()).or_default();
         sizes.entry(size).or_default().extend(trained.iter().map(|t| (t.accuracy, t.parameters)));
     }
 
-    /// Writes them.
+    /// Writes the trainings.
     ///
     /// # Errors
-    /// If they cannot be written.
+    /// Returns an error if they cannot be written.
     pub fn write(&self) -> Result<(), Error> {
         let text =
             serde_json::to_string(&self.content).map_err(|error| Error::other(error.to_string()))? + "\n";

@@ -1,15 +1,15 @@
-//! `Unwritten`: results that could not be written. The work goes on all the same: they can still be
-//! shown, and perhaps be written later.
+//! `Unwritten`: results that could not be written. The work continues all the same: they can still
+//! be displayed, and perhaps written later.
 
 use crate::base::error::{Error, ErrorKind};
 use crate::base::session::Session;
 
-/// How writing the results went the last time.
+/// The outcome of the last attempt to write the results.
 #[derive(Debug, Default)]
 pub(crate) struct Unwritten(Option<Error>);
 
 impl Unwritten {
-    /// Notes how writing went; when it begins to fail, warns.
+    /// Records the outcome of writing, and warns when it begins to fail.
     ///
     /// # Errors
     /// If the folder is no longer this process's: to try again would not help.
@@ -24,7 +24,7 @@ impl Unwritten {
         Ok(())
     }
 
-    /// Why the latest results are not in their file, if they are not.
+    /// Returns the reason why the latest results are not in their file, if they are not.
     pub fn error(self) -> Option<Error> {
         self.0
     }

@@ -12,22 +12,22 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// What `validation.json` calls itself, and the version of its schema.
+/// The `format` of `validation.json`, and the version of its schema.
 pub(crate) const FORMAT: (&str, u32) = ("morphcog-validation", 1);
 
-/// How a robot did on all validation images.
+/// The results of a robot on all validation images.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Validated {
-    /// Its id.
+    /// The id of the robot.
     pub id: String,
-    /// Its task.
+    /// The task of the robot.
     pub task: String,
-    /// Images.
+    /// The number of images.
     pub images: usize,
-    /// Images answered correctly.
+    /// The number of images answered correctly.
     pub right: usize,
-    /// Mean over the two groups of the share answered correctly.
+    /// The mean over the two groups of the share answered correctly.
     #[serde(deserialize_with = "ranges::share")]
     pub balanced_accuracy: f64,
 }
@@ -38,30 +38,29 @@ pub struct Validated {
 pub(crate) struct ValidationFile {
     pub format: String,
     pub format_version: u32,
-    /// SHA-256 of the run's content: of a run that has gone on since, this says nothing.
+    /// The SHA-256 of the run's content; the file says nothing about later states of the run.
     pub run_sha256: String,
-    /// SHA-256 of all that the result depends on; empty if the run's own choice is not known.
+    /// The SHA-256 of all inputs of the result; empty if the run's own choice is unknown.
     pub key: String,
-    /// The best of each task, best first, as the run's config chooses them.
+    /// The best robots of each task, best first, chosen as in the run's config.
     pub robots: Vec<Validated>,
-    /// Those that were chosen in other ways.
+    /// The robots chosen in other ways.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub others: Vec<Ranking>,
 }
 
-/// Robots that were chosen otherwise than the run's config says: of other robots, by more images, by
-/// another threshold.
+/// Robots not chosen as in the run's config: from others, by more images, or another threshold.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Ranking {
-    /// SHA-256 of all that the result depends on.
+    /// The SHA-256 of everything that the result depends on.
     pub key: String,
-    /// The best of each task, best first.
+    /// The best robots of each task, best first.
     pub robots: Vec<Validated>,
 }
 
 impl Validated {
-    /// Checks that its counts go together; errors name the key.
+    /// Checks that the counts agree; errors name the key.
     pub(crate) fn check(&self) -> Result<(), Error> {
         match self.right <= self.images && self.images > 0 {
             true => Ok(()),
@@ -70,7 +69,7 @@ impl Validated {
     }
 }
 
-/// Checks that robots are there once for a task, and their counts go together.
+/// Checks that every robot occurs once per task, and that counts agree.
 fn check_robots(robots: &[Validated]) -> Result<(), Error> {
     for (number, robot) in robots.iter().enumerate() {
         robot.check().map_err(|error| error.in_place(&format!("robots[{number}]")))?;
@@ -97,7 +96,7 @@ impl Stored for ValidationFile {
 }
 
 impl ValidationFile {
-    /// The robots that were chosen in the way that a key names.
+    /// Returns the robots that were chosen in the way that a key names.
     pub fn of(&self, key: &str) -> Option<&[Validated]> {
         match self.key == key {
             true => Some(&self.robots),
@@ -105,10 +104,10 @@ impl ValidationFile {
         }
     }
 
-    /// What is in a file, if there is one.
+    /// Reads a file, or returns `None` if there is none.
     ///
     /// # Errors
-    /// If it cannot be read.
+    /// Returns an error if it cannot be read.
     pub fn read(path: &Path) -> Result<Option<Self>, Error> {
         if !exists(path) {
             return Ok(None);
@@ -119,8 +118,8 @@ impl ValidationFile {
     }
 }
 
-/// The best robots of a run on validation images, as its config chooses them, as far as they are
-/// known for the run as it is; `None` if none are.
+/// Returns the best robots of a run on validation images, chosen as in its config, if they are
+/// known for its present state.
 ///
 /// # Errors
 /// If the file that says so cannot be read.
@@ -128,7 +127,7 @@ pub(crate) fn ranking(source: &StoredRun) -> Result<Option<Vec<Validated>>, Erro
     let ValidationConfig { images, best } = source.run.config.validation;
     let file = ValidationFile::read(&source.path.with_file_name(VALIDATION_JSON))?;
     let is_of = |file: &ValidationFile| file.run_sha256 == source.run.fingerprint();
-    // Earlier versions kept whatever choice was made last.
+    // Earlier versions kept the latest choice, whatever it was.
     let is_own = |robots: &[Validated]| {
         let of_task = |task: &str| robots.iter().filter(|other| other.task == task).count();
         robots.iter().all(|robot| robot.images == images && (best == 0 || of_task(&robot.task) <= best))
@@ -137,8 +136,8 @@ pub(crate) fn ranking(source: &StoredRun) -> Result<Option<Vec<Validated>>, Erro
     Ok(file.filter(is_known).map(|file| file.robots))
 }
 
-/// How many images the robots in the `validation.json` beside a run were chosen by, at most; `None`
-/// without such a file.
+/// Returns the largest number of images by which robots in the `validation.json` beside a run were
+/// chosen, or `None` without such a file.
 ///
 /// # Errors
 /// If it cannot be read.

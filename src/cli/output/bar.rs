@@ -1,5 +1,4 @@
-//! What moves on the terminal while something runs: progress and live pictures. All of it is
-//! written by [`Console`].
+//! Moving output on the terminal: progress and live pictures. [`Console`] writes all of it.
 
 use crate::base::observer::Generation;
 use crate::base::text::one_line;
@@ -11,7 +10,7 @@ use serde::Serialize;
 use std::sync::Mutex;
 use std::time::Instant;
 
-/// A line that is rewritten on a terminal, and repeated from time to time elsewhere.
+/// A progress line, rewritten on a terminal and repeated from time to time elsewhere.
 struct Line<'c> {
     console: &'c Console,
     total: u64,
@@ -26,7 +25,7 @@ impl<'c> Line<'c> {
         Line { console, total, begin: Instant::now(), moving, pacer: Mutex::default() }
     }
 
-    /// Shows the text, made from the seconds since the beginning.
+    /// Displays the text, which depends on the seconds since the beginning.
     fn show(&self, done: u64, text: impl FnOnce(f64) -> Words) {
         let seconds = self.begin.elapsed().as_secs_f64();
         let text = |columns: usize| {
@@ -55,7 +54,7 @@ impl Drop for Line<'_> {
     }
 }
 
-/// Progress of an evolution; the line goes when this is dropped.
+/// The progress of an evolution; the line disappears on drop.
 pub struct Bar<'c> {
     recent: Mutex<Option<Recent<Generation>>>,
     line: Line<'c>,
@@ -66,8 +65,8 @@ impl<'c> Bar<'c> {
         Bar { recent: Mutex::new(None), line: Line::new(console, total) }
     }
 
-    /// Shows how far it is (JSON: an event `generation`). The first call counts as the beginning: a
-    /// resumed run calls it once before it goes on.
+    /// Displays the progress (JSON: an event `generation`). The first call counts as the beginning:
+    /// a resumed run calls it once before it continues.
     pub fn update(&self, progress: &Generation) {
         self.line.show(progress.done, |seconds| {
             let mut recent = lock(&self.recent);
@@ -79,7 +78,7 @@ impl<'c> Bar<'c> {
     }
 }
 
-/// Progress of something counted; the line goes when this is dropped.
+/// The progress of something counted; the line disappears on drop.
 pub struct Counter<'c> {
     label: String,
     unit: String,
@@ -97,19 +96,18 @@ impl<'c> Counter<'c> {
         }
     }
 
-    /// Shows that `known` of the things were done before.
+    /// Marks `known` items as done before, so that they do not count for the speed.
     pub fn go_on_from(&self, known: u64) {
         *lock(&self.recent) = Recent::new(self.line.begin.elapsed().as_secs_f64(), known);
         self.update(known);
     }
 
-    /// Leaves `count` of the things that will be shown as done out of the speed.
+    /// Excludes `count` items, later reported as done, from the speed.
     pub fn skip(&self, count: u64) {
         lock(&self.recent).shift(|done| *done += count);
     }
 
-    /// Shows that `done` of the things are done (JSON: an event `progress`, as often as a plain
-    /// line).
+    /// Displays that `done` items are done (JSON: an event `progress`, as often as a plain line).
     pub fn update(&self, done: u64) {
         #[derive(Serialize)]
         struct Count<'a> {
@@ -130,7 +128,7 @@ impl<'c> Counter<'c> {
     }
 }
 
-/// A picture of text on stdout, drawn over by the next.
+/// A text picture on stdout, which the next one replaces.
 pub struct Live<'c> {
     console: &'c Console,
     height: usize,
@@ -141,7 +139,7 @@ impl<'c> Live<'c> {
         Live { console, height: 0 }
     }
 
-    /// Shows a picture in the place of the one before.
+    /// Displays a picture in place of the previous one.
     pub fn show(&mut self, picture: &str) {
         let up = if self.height > 0 { format!("\x1b[{}F", self.height) } else { String::new() };
         self.height = picture.lines().count();

@@ -1,5 +1,4 @@
-//! [`Console`]: the only writer to the terminal. Results go to stdout; progress, notes and errors
-//! to stderr.
+//! [`Console`]: the only writer to the terminal. Results go to stdout, everything else to stderr.
 #![allow(clippy::disallowed_methods, reason = "this is the module that writes")]
 
 pub use crate::cli::output::bar::{Bar, Counter, Live};
@@ -16,14 +15,14 @@ use std::io::{self, IsTerminal, Write};
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Most characters of a cell of a table.
+/// Maximum number of characters in a table cell.
 const CELL: usize = 400;
 /// Columns of the moving line's bar, and of the blank behind it.
 const BAR: usize = 9;
-/// Columns of a terminal that does not tell its own.
+/// Columns of a terminal of unknown width.
 const USUAL: usize = 80;
 
-/// For whom the console writes.
+/// The reader that the console writes for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
     /// People: a moving progress line on a terminal, plain lines elsewhere.
@@ -31,18 +30,18 @@ pub enum Mode {
     Human,
     /// Results, warnings and errors only.
     Quiet,
-    /// Programs: one JSON object per line on stdout, its kind under `event`, progress and notes too;
-    /// warnings on stderr, errors on both. docs/command-line.md has all kinds.
+    /// Programs: one JSON object per line on stdout, its kind under `event`, including progress and
+    /// notes. Warnings go to stderr, errors to both. docs/command-line.md lists all kinds.
     Json,
 }
 
-/// The terminal, or what stands for it. May be shared between threads.
+/// The terminal, or a replacement. Threads may share it.
 pub struct Console {
     mode: Mode,
-    /// What is known of stdout and stderr: whether they are terminals that can move the cursor.
+    /// True for stdout and stderr if they are terminals that can move the cursor.
     terminals: [bool; 2],
     colour: bool,
-    /// Whether stdout and stderr have so many columns and no more.
+    /// True for stdout and stderr if their width is limited to the terminal's columns.
     narrow: [bool; 2],
     streams: Mutex<Streams>,
     /// The progress line on the terminal, which must step aside for other lines.
@@ -52,13 +51,13 @@ pub struct Console {
 struct Streams {
     out: Box<dyn Write + Send>,
     err: Box<dyn Write + Send>,
-    /// The reader of stdout has gone (`| head`), or it takes no more.
+    /// True if the reader of stdout has gone (`| head`), or accepts no more.
     closed: bool,
-    /// Results were lost for another reason than a closed pipe: a full disk.
+    /// True if results were lost for another reason than a closed pipe, such as a full disk.
     lost: bool,
 }
 
-/// Columns of the terminal.
+/// Returns the number of columns of the terminal.
 fn columns() -> usize {
     let told = crossterm::terminal::size().ok().map(|(columns, _)| usize::from(columns));
     told.filter(|columns| *columns > 0).unwrap_or(USUAL)
@@ -70,8 +69,8 @@ pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Console {
-    /// The process's stdout and stderr. No colours if `NO_COLOR` is set; no moving lines if `TERM`
-    /// is `dumb`.
+    /// Creates a console on the process's stdout and stderr. It has no colours if `NO_COLOR` is
+    /// set, and no moving lines if `TERM` is `dumb`.
     pub fn new(mode: Mode) -> Self {
         let set = |name| std::env::var_os(name).filter(|v| !v.is_empty());
         let smart = set("TERM").is_none_or(|term| term != "dumb");
@@ -84,7 +83,7 @@ impl Console {
         }
     }
 
-    /// A console onto any two writers, taken for files: no colours, no moving lines.
+    /// Creates a console on any two writers, treated as files: no colours, no moving lines.
     pub fn with_writers(mode: Mode, out: Box<dyn Write + Send>, err: Box<dyn Write + Send>) -> Self {
         let streams = Mutex::new(Streams { out, err, closed: false, lost: false });
         Console {
@@ -97,34 +96,34 @@ impl Console {
         }
     }
 
-    /// Columns of stdout (0) or stderr (1) at present; all that are needed if it is no terminal.
+    /// Returns the current columns of stdout (0) or stderr (1), unlimited if it is no terminal.
     fn columns(&self, stream: usize) -> usize {
         if self.narrow[stream] { columns() } else { usize::MAX }
     }
 
-    /// For whom it writes.
+    /// Returns the mode.
     pub fn mode(&self) -> Mode {
         self.mode
     }
 
-    /// Whether pictures in colour may be written to stdout.
+    /// Returns true if stdout may contain pictures in colour.
     pub fn has_colour(&self) -> bool {
         self.terminals[0] && self.colour
     }
 
-    /// Whether the reader of stdout has gone.
+    /// Returns true if the reader of stdout has gone.
     pub fn is_closed(&self) -> bool {
         lock(&self.streams).closed
     }
 
-    /// Whether results could not be written though somebody wanted them, as on a full disk.
+    /// Returns true if wanted results could not be written, for example because the disk is full.
     pub fn has_lost_results(&self) -> bool {
         lock(&self.streams).lost
     }
 
-    /// A line of results, to stdout; an empty one parts others for people. Like all that people are
-    /// told, it shows control characters and line breaks, which can only come from a file or its
-    /// name, and obeys none; and a terminal shows it in lines that break between words.
+    /// Writes a line of results to stdout; an empty line separates results for people. Like all
+    /// text for people, it displays control characters and line breaks, which can only come from a
+    /// file or its name, and never obeys them. On a terminal, lines break between words.
     pub fn line(&self, text: &str) {
         match self.mode {
             Mode::Json if text.is_empty() => {}
@@ -133,7 +132,7 @@ impl Console {
         }
     }
 
-    /// A command line for a shell, to stdout: one line however long it is.
+    /// Writes a shell command to stdout, on one line however long it is.
     pub fn command(&self, text: &str) {
         match self.mode {
             Mode::Json => self.event("result", &Text { text, file: None }),
@@ -141,7 +140,7 @@ impl Console {
         }
     }
 
-    /// A line of results about a file, as "wrote walk.gif" (JSON: its path under `file`, too).
+    /// Writes a line about a file, such as "wrote walk.gif" (JSON: with its path under `file`).
     pub fn line_about(&self, file: &Path, text: &str) {
         match self.mode {
             Mode::Json => self.event("result", &Text { text, file: Some(file.display().to_string()) }),
@@ -149,13 +148,13 @@ impl Console {
         }
     }
 
-    /// A document as it is, to stdout, in every mode: a config, a man page, a trajectory.
+    /// Writes a document unchanged to stdout, in every mode: a config, a man page, a trajectory.
     pub fn text(&self, text: &str) {
         self.out(text);
     }
 
-    /// A table of results, to stdout; columns of numbers are aligned to the right. A terminal shows it
-    /// as [`table::fitted`] fits it.
+    /// Writes a table of results to stdout, with numeric columns aligned to the right. On a
+    /// terminal, [`table::fitted`] fits it to the width.
     pub fn table(&self, headers: &[&str], rows: &[Vec<String>]) {
         #[derive(Serialize)]
         struct Table<'a> {
@@ -174,8 +173,8 @@ impl Console {
         }
     }
 
-    /// One JSON line on stdout: the payload's fields after `"event": name` (a payload that is no
-    /// object: as `value`). Nothing in the other modes.
+    /// Writes one JSON line to stdout: the payload's fields after `"event": name` (a payload that
+    /// is no object: as `value`). Does nothing in other modes.
     pub fn event(&self, name: &str, payload: &impl Serialize) {
         if self.mode != Mode::Json {
             return;
@@ -188,8 +187,7 @@ impl Console {
             Some(fields) => format!(",{fields}"),
             None => format!(",\"value\":{payload}}}"),
         };
-        // Valid JSON that a terminal may take for a command all the same stands in texts only,
-        // where it may be written so.
+        // Escapes what a terminal may take for a command; it occurs only inside JSON strings.
         let fields: String = match fields.contains(is_unseen) {
             true => fields.chars().map(in_json).collect(),
             false => fields,
@@ -197,7 +195,7 @@ impl Console {
         self.out(&format!("{{\"event\":{name}{fields}\n"));
     }
 
-    /// A note to people, to stderr (JSON: an event).
+    /// Writes a note for people to stderr (JSON: an event).
     pub fn info(&self, text: &str) {
         match self.mode {
             Mode::Human => self.err(&lines(wrapped(&one_line(text), self.columns(1)))),
@@ -206,8 +204,8 @@ impl Console {
         }
     }
 
-    /// A note with a command to copy: "next:", and what is next. Blanks instead of "next:" align it
-    /// with one above.
+    /// Writes a note with a command to copy: "next:" and the command. Blanks in place of "next:"
+    /// align it with the note above.
     pub fn suggest(&self, about: &str, command: &str) {
         match self.mode {
             Mode::Human => self.err(&lines(wrapped_command(about, command, self.columns(1)))),
@@ -215,19 +213,19 @@ impl Console {
         }
     }
 
-    /// A warning, to stderr, in every mode.
+    /// Writes a warning to stderr, in every mode.
     pub fn warning(&self, text: &str) {
         self.err(&self.painted("warning:", "1;33", text));
     }
 
-    /// An error and what to do about it, in the words of the command line, to stderr, in every mode.
+    /// Writes an error and its remedy, in the command line's terms, to stderr, in every mode.
     pub fn failed(&self, error: &base::error::Error) {
         let explained = explain(error);
         self.error(&explained, explained.hint.as_deref());
     }
 
-    /// An error with its causes and perhaps what to do, to stderr, in every mode. A cause that the
-    /// line above it already tells is left out.
+    /// Writes an error with its causes and an optional hint to stderr, in every mode. A cause that
+    /// the line above already contains is left out.
     pub fn error(&self, error: &(dyn Error + 'static), hint: Option<&str>) {
         let mut told = error.to_string();
         let mut text = self.painted("error:", "1;31", &told);
@@ -252,31 +250,30 @@ impl Console {
         );
     }
 
-    /// Words on a wrong command line, plain and with colours, to stderr.
+    /// Writes a usage message, plain or coloured, to stderr.
     pub fn usage(&self, plain: &str, coloured: &str) {
         let text = if self.terminals[1] && self.colour { coloured } else { plain };
         let columns = self.columns(1);
         self.err(&lines(text.lines().flat_map(|line| wrapped(line, columns)).collect()));
     }
 
-    /// Progress of an evolution: call [`Bar::update`] after every generation.
+    /// Creates the progress of an evolution: call [`Bar::update`] after every generation.
     pub fn progress(&self, total: u64) -> Bar<'_> {
         Bar::new(self, total)
     }
 
-    /// Progress of anything counted: `label`, how many `unit`s in all ("images", "robots",
-    /// "bytes").
+    /// Creates the progress of `total` counted `unit`s, such as "images", "robots" or "bytes".
     pub fn counter(&self, label: &str, total: u64, unit: &str) -> Counter<'_> {
         Counter::new(self, label, total, unit)
     }
 
-    /// A picture of text that is drawn over by the next, on stdout; none if that is not a terminal
-    /// for people.
+    /// Creates a text picture on stdout that the next one replaces, or returns `None` if stdout is
+    /// not a terminal for people.
     pub fn live(&self) -> Option<Live<'_>> {
         (self.mode == Mode::Human && self.terminals[0]).then(|| Live::new(self))
     }
 
-    /// The lines of a text behind a word in colour.
+    /// Formats a text behind a coloured word.
     fn painted(&self, word: &str, code: &str, text: &str) -> String {
         let text = lines(wrapped(&format!("{word} {}", one_line(text)), self.columns(1)));
         match self.terminals[1] && self.colour {
@@ -302,12 +299,12 @@ impl Console {
     }
 
     pub(super) fn err(&self, text: &str) {
-        // Where stderr is closed, an error has no reader.
+        // If stderr is closed, nobody reads the error.
         let _ =
             self.aside(|streams| streams.err.write_all(text.as_bytes()).and_then(|()| streams.err.flush()));
     }
 
-    /// Writes while the progress line is out of the way.
+    /// Writes while the progress line is suspended.
     fn aside<R>(&self, write: impl FnOnce(&mut Streams) -> R) -> R {
         let line = lock(&self.line).clone();
         let write = || write(&mut lock(&self.streams));
@@ -317,15 +314,14 @@ impl Console {
         }
     }
 
-    /// A moving line on the terminal, if there is one for people; it is taken away by
-    /// [`Console::clear_line`].
+    /// Creates a moving line on a terminal for people, which [`Console::clear_line`] removes.
     pub(super) fn moving_line(&self, total: u64) -> Option<ProgressBar> {
         if self.mode != Mode::Human || !self.terminals[1] {
             return None;
         }
         let line = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(10));
         let bar = if self.colour { "{bar:8.cyan/dim}" } else { "{bar:8}" };
-        // The template is fixed: if it were wrong, the default would show.
+        // The template is fixed; if it were wrong, the default would apply.
         if let Ok(style) = ProgressStyle::with_template(&format!("{bar} {{wide_msg}}")) {
             line.set_style(style.progress_chars("━━─"));
         }
@@ -333,12 +329,11 @@ impl Console {
         Some(line)
     }
 
-    /// Columns of the moving line that are left for words.
+    /// Returns the columns that the moving line leaves for words.
     pub(super) fn room(&self) -> usize {
         self.columns(1).saturating_sub(BAR)
     }
 
-    /// Takes the moving line away.
     pub(super) fn clear_line(&self) {
         if let Some(line) = lock(&self.line).take() {
             line.finish_and_clear();
@@ -346,12 +341,12 @@ impl Console {
     }
 }
 
-/// Lines with their ends.
+/// Joins lines and ends the last.
 fn lines(lines: Vec<String>) -> String {
     lines.join("\n") + "\n"
 }
 
-/// A character of a JSON text, as an escape if it is not to be seen.
+/// Escapes a character of a JSON text if it is invisible.
 fn in_json(c: char) -> String {
     let mut units = [0; 2];
     match is_unseen(c) {
@@ -373,7 +368,7 @@ pub(super) mod tests {
     use crate::base::observer::Generation;
     use std::sync::Arc;
 
-    /// A writer that can be read, or that refuses like a closed pipe.
+    /// A writer that can be read, or that fails like a closed pipe.
     #[derive(Clone, Default)]
     pub struct Page {
         text: Arc<Mutex<Vec<u8>>>,

@@ -1,4 +1,4 @@
-//! What `morphcog plot` makes: figures as SVG and PNG.
+//! `morphcog plot`: writes figures as SVG and PNG.
 
 use crate::base::error::Error;
 use crate::base::remedy::{Invocation, Remedy};
@@ -22,27 +22,27 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// What a figure shows.
+/// The subject of a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// A robot's voxels.
+    /// The voxels of a robot.
     Body,
-    /// Its position over time.
+    /// The position of a robot over time.
     Spacetime,
-    /// Poses of its rollout.
+    /// Poses of a robot's rollout.
     Snapshots,
-    /// Fitness in the archive.
+    /// The fitness in the archive.
     Archive,
-    /// A run's metrics.
+    /// The metrics of a run.
     Progress,
-    /// What `eval` found.
+    /// The results of `eval`.
     Accuracy,
-    /// What `capacity` found.
+    /// The results of `capacity`.
     Capacity,
 }
 
 impl Kind {
-    /// All of them with their names.
+    /// All kinds with their names.
     pub const ALL: [(Kind, &str); 7] = [
         (Kind::Body, "body"),
         (Kind::Spacetime, "spacetime"),
@@ -53,7 +53,7 @@ impl Kind {
         (Kind::Capacity, "capacity"),
     ];
 
-    /// Whether it shows one robot.
+    /// Returns true if the figure shows one robot.
     pub fn is_of_robot(self) -> bool {
         matches!(self, Kind::Body | Kind::Spacetime | Kind::Snapshots)
     }
@@ -74,37 +74,37 @@ impl FromStr for Kind {
     }
 }
 
-/// What to make, and where.
+/// The figures to make, and their files.
 #[derive(Clone, Debug)]
 pub struct Wanted {
-    /// What it shows.
+    /// The subject.
     pub kind: Kind,
-    /// The run.json files; none: the newest under `runs/`.
+    /// The run.json files; if empty, the newest under `runs/`.
     pub archives: Vec<PathBuf>,
-    /// The robots, of a kind that shows some.
+    /// The robots, for kinds that show a robot.
     pub robots: Vec<Named>,
-    /// How to find robots and images; its robot and archive are not looked at.
+    /// The options that find robots and images; its own robot and archive are ignored.
     pub options: Options,
-    /// Control steps between poses; 0: as suits the walk.
+    /// The control steps between poses; 0 chooses them from the walk.
     pub every: usize,
-    /// The file; `None`: SVG and PNG beside the run.json.
+    /// The file; `None` writes SVG and PNG beside the run.json.
     pub out: Option<PathBuf>,
-    /// Pixels of PNG per inch; none: as for print, or as many as there can be.
+    /// The pixels of PNG per inch; `None` is as for print, or as many as possible.
     pub dpi: Option<u32>,
-    /// What is behind it.
+    /// The background.
     pub background: Background,
 }
 
-/// A figure and its file without the ending.
+/// A figure and its file without the extension.
 struct Made {
     figure: Figure,
     stem: PathBuf,
 }
 
-/// Makes figures, says where they are; the files made.
+/// Makes figures, reports their files and returns these.
 ///
 /// # Errors
-/// What is wrong with the command line or a file, or if a figure cannot be made or written.
+/// Returns an error if an input is invalid, or a figure cannot be made or written.
 pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
     let endings = endings(wanted.out.as_deref())?;
     let archives = match wanted.archives.as_slice() {
@@ -140,7 +140,7 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
             };
             Ok((path, bytes))
         };
-        // Nothing is written before all of it is made.
+        // Makes all files before writing any.
         for (path, bytes) in endings.iter().map(made).collect::<Result<Vec<_>, _>>()? {
             write_whole(&path, &bytes)?;
             console.line_about(&path, &format!("wrote {}", path.display()));
@@ -192,7 +192,7 @@ pub fn make(console: &Console, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
     Ok(files)
 }
 
-/// A figure as PNG; says if it has fewer pixels than figures usually have.
+/// Encodes a figure as PNG; notes if its resolution is lower than usual.
 fn png(console: &Console, path: &Path, figure: &Figure, dpi: Option<u32>) -> Result<Vec<u8>, Error> {
     if let Some(dpi) = dpi {
         possible(figure, dpi)?;
@@ -206,7 +206,7 @@ fn png(console: &Console, path: &Path, figure: &Figure, dpi: Option<u32>) -> Res
     Ok(figure.print()?)
 }
 
-/// Whether a figure can have so many pixels per inch.
+/// Checks that a figure can have so many pixels per inch.
 fn possible(figure: &Figure, dpi: u32) -> Result<(), Error> {
     let most = figure.fitting(dpi);
     match most < dpi {
@@ -218,10 +218,10 @@ fn possible(figure: &Figure, dpi: u32) -> Result<(), Error> {
     }
 }
 
-/// The formats that a file name asks for.
+/// Returns the formats that a file name implies.
 ///
 /// # Errors
-/// If it is none of a figure.
+/// Returns an error if the extension is not that of a figure.
 pub fn endings(out: Option<&Path>) -> Result<Vec<&'static str>, Error> {
     let Some(path) = out else { return Ok(vec!["svg", "png"]) };
     folder::of_file(path)?;
@@ -243,7 +243,7 @@ fn with_ending(stem: &Path, ending: &str) -> PathBuf {
     PathBuf::from(name)
 }
 
-/// That a kind of figure shows no robot, where one is named.
+/// Returns the error for a robot named with a kind of figure that shows none.
 pub fn no_robot(kind: Kind) -> Error {
     let of_robots = Kind::ALL.iter().filter(|(kind, _)| kind.is_of_robot()).map(|(_, name)| *name);
     let of_robots = of_robots.collect::<Vec<_>>().join(", ");
@@ -251,7 +251,7 @@ pub fn no_robot(kind: Kind) -> Error {
     Error::usage(text).about("robot")
 }
 
-/// That a run has too few generations for a line.
+/// Returns the error for a run with too few generations for a line.
 fn too_short(path: &Path, run: &RunFile, generations: usize) -> Error {
     let path = path.with_file_name(METRICS);
     let text = format!("{}: expected at least 2 generations, found {generations}", path.display());
@@ -312,7 +312,7 @@ fn of_run(kind: Kind, path: &Path) -> Result<Figure, Error> {
             if beside != *path {
                 let run = RunFile::read(path)?;
                 let is_of_it = match exists(&eval) {
-                    // Where its robots come from.
+                    // The runs of its robots.
                     true => file.is_of(&EvalFile::of_runs(&eval, &[&run])?),
                     false => file.run == run.name,
                 };
@@ -328,8 +328,7 @@ fn of_run(kind: Kind, path: &Path) -> Result<Figure, Error> {
     }
 }
 
-/// A result file: the one of a run.json, where such results go, or the file itself that was named
-/// instead.
+/// Returns the usual result file of a run.json, or the given file itself if it is no run.json.
 fn result(path: &Path, name: &str) -> PathBuf {
     match path.file_name().is_some_and(|given| given == RUN_JSON) {
         true => folder::beside(path, name),
@@ -337,7 +336,7 @@ fn result(path: &Path, name: &str) -> PathBuf {
     }
 }
 
-/// What distinguishes the figure of a result file that was named itself.
+/// Returns the part of a figure's name that comes from a directly named result file.
 fn result_name(kind: Kind, path: &Path) -> String {
     let is_result = matches!(kind, Kind::Accuracy | Kind::Capacity);
     let stem =

@@ -1,4 +1,4 @@
-//! What the program shows on a terminal: messages, tables, progress, the results of commands, walks.
+//! Terminal output: messages, tables, progress, the results of commands, walks.
 
 pub mod bar;
 pub mod console;

@@ -1,4 +1,4 @@
-//! What `morphcog capacity` says at its end: the paper's table.
+//! The results of `morphcog capacity`: the paper's table.
 
 use crate::analysis::published;
 use crate::base::number;
@@ -13,15 +13,15 @@ use crate::draw::report::tables::size;
 use crate::store::capacity::{CapacityFile, TaskCapacity};
 use std::path::{Path, PathBuf};
 
-/// The table: task, accuracy and capacity, the paper's beside ours; `out` is the file, if it was
-/// written.
+/// Writes the table: task, accuracy and capacity, with the paper's values beside ours. `out` is the
+/// file, if it was written.
 pub fn capacity(console: &Console, file: &CapacityFile, out: Option<&Path>) {
     if console.mode() == Mode::Json {
         let written = out.filter(|_| !file.tasks.is_empty()).map(|out| out.display().to_string());
         let done = serde_json::json!({ "file": written, "stopped": file.stopped, "tasks": file.tasks });
         return console.event("capacity", &done);
     }
-    // Stopped before anything was found: nothing was written.
+    // Stopped before the first result: nothing was written.
     if file.tasks.is_empty() {
         return;
     }
@@ -56,8 +56,8 @@ pub fn capacity(console: &Console, file: &CapacityFile, out: Option<&Path>) {
     }
 }
 
-/// The paper's table: each task with its robots, their accuracy (0 to 1) and their capacity as far
-/// as it is known, the paper's figures beside.
+/// Writes the paper's table: each task with its robots, their accuracy (0 to 1) and their capacity
+/// if known, with the paper's values beside them.
 pub(super) fn papers_table<'a>(
     console: &Console,
     dataset: &str,
@@ -86,15 +86,15 @@ pub(super) fn papers_table<'a>(
     console.table(&headers, &rows.collect::<Vec<_>>());
 }
 
-/// A value that was not measured, in a table.
+/// Returns the table cell of a value that was not measured.
 fn unknown() -> String {
     "–".to_string()
 }
 
-/// The figure beside a `capacity.json`, as SVG and as PNG; the files.
+/// Writes the figure beside a `capacity.json`, as SVG and as PNG; returns the files.
 ///
 /// # Errors
-/// If it cannot be made or written.
+/// Returns an error if the figure cannot be made or written.
 pub fn figure(file: &CapacityFile, out: &Path) -> Result<[PathBuf; 2], PictureError> {
     let figure = plot::capacity(file);
     let files = FIGURES.map(|ending| out.with_extension(ending));
@@ -103,7 +103,7 @@ pub fn figure(file: &CapacityFile, out: &Path) -> Result<[PathBuf; 2], PictureEr
     Ok(files)
 }
 
-/// After a reproduction: the paper's table, the paper's figures beside ours.
+/// Writes the paper's table after a reproduction, with the paper's values beside ours.
 pub fn table(console: &Console, finished: &Finished) {
     if console.mode() == Mode::Json {
         return console.event("reproduced", &finished.rows);

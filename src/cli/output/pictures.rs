@@ -1,4 +1,4 @@
-//! What `morphcog replay` makes of a recording: files, or a view in the terminal.
+//! The output of `morphcog replay`: files, or a view in the terminal.
 
 use crate::base::error::Error;
 use crate::base::number;
@@ -16,16 +16,16 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// A way to show a recording.
+/// A format of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// Animated GIF.
+    /// An animated GIF.
     Gif,
-    /// Self-contained page for the browser.
+    /// A self-contained page for the browser.
     Html,
     /// The last frame as PNG.
     Png,
-    /// Played in the terminal.
+    /// A live view in the terminal.
     Terminal,
 }
 
@@ -48,23 +48,23 @@ impl FromStr for Format {
     }
 }
 
-/// The formats that are asked for; if none is, an animation and a page.
+/// Returns the requested formats, or by default an animation and a page.
 fn or_default(asked: &[Format]) -> &[Format] {
     if asked.is_empty() { &[Format::Gif, Format::Html] } else { asked }
 }
 
-/// What to make, and where.
+/// The pictures to make, and their files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wanted {
-    /// Formats with their files (none for the terminal).
+    /// The formats with their files (unused for the terminal).
     pub files: Vec<(Format, PathBuf)>,
-    /// Width of GIF and PNG, pixels.
+    /// The width of GIF and PNG, pixels.
     pub width: u32,
-    /// Control steps from one frame of the GIF to the next.
+    /// The control steps from one frame of the GIF to the next.
     pub every: usize,
-    /// Frames of the GIF per second.
+    /// The frames of the GIF per second.
     pub fps: u32,
-    /// How GIF and PNG draw the world.
+    /// The look of the world in GIF and PNG.
     pub look: Look,
 }
 
@@ -75,16 +75,16 @@ impl Default for Wanted {
 }
 
 impl Wanted {
-    /// `replay-<name>.<format>` in a folder.
+    /// Chooses `replay-<name>.<format>` in a folder.
     pub fn beside(folder: &Path, name: &str, formats: &[Format]) -> Self {
         let file = |&format: &Format| (format, folder.join(format!("replay-{name}.{format}")));
         Wanted { files: or_default(formats).iter().map(file).collect(), ..Wanted::default() }
     }
 
-    /// A file whose ending says the format; without an ending, one file for each of `formats`.
+    /// Takes the format from a file's extension; without one, chooses a file for each of `formats`.
     ///
     /// # Errors
-    /// If the ending is none of the formats', or a file cannot be written.
+    /// Returns an error if the extension is no known format, or a file cannot be written.
     pub fn named(path: &Path, formats: &[Format]) -> Result<Self, Error> {
         folder::of_file(path)?;
         let files = match path.extension().map(|ending| ending.to_string_lossy().into_owned()) {
@@ -125,10 +125,10 @@ pub fn folder(archive: &Path) -> PathBuf {
     }
 }
 
-/// Makes the pictures, says where they are and what the robot did; the files made.
+/// Makes the pictures, reports their files and the robot's walk, and returns the files.
 ///
 /// # Errors
-/// If a picture cannot be made or written.
+/// Returns an error if a picture cannot be made or written.
 pub fn make(console: &Console, replay: &Replay, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
     let failed = |error: PictureError| match error {
         PictureError::Size { .. } => Error::usage(error.to_string()).about("width"),

@@ -1,5 +1,5 @@
-//! Plays a recording in the terminal: the robot's own speed, keys to pause and step, and the
-//! terminal as it was at the end.
+//! Plays a recording in the terminal at the robot's own speed, with keys to pause and step. It
+//! restores the terminal at the end.
 
 use crate::base::error::Error;
 use crate::base::signals;
@@ -13,15 +13,15 @@ use std::io::IsTerminal;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-/// Time from one picture to the next: thirty in a second.
+/// Time from one picture to the next: thirty per second.
 const TICK: Duration = Duration::from_millis(33);
-/// Control steps in a second of the robot's time.
+/// Control steps per second of the robot's time.
 const STEPS_PER_SECOND: f64 = 50.0;
-/// Columns and rows of a terminal that does not say its own, and the largest view.
+/// Columns and rows of a terminal of unknown size, and the largest view.
 const USUAL: (u16, u16) = (80, 24);
 const LARGEST: (usize, usize) = (140, 46);
 
-/// What a key asks for.
+/// The action of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Key {
     Pause,
@@ -30,7 +30,7 @@ enum Key {
     Quit,
 }
 
-/// Where the film is.
+/// The position in the recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Player {
     last: usize,
@@ -60,17 +60,17 @@ impl Player {
 
     fn pass(&mut self, time: Duration) {
         if !self.is_paused {
-            // The last frame is shown before the end.
+            // Displays the last frame before the end.
             self.has_ended |= self.frame() == self.last;
             self.at = (self.at + STEPS_PER_SECOND * time.as_secs_f64()).min(self.last as f64);
         }
     }
 }
 
-/// Plays a recording; where there is no terminal for people, its last frame only.
+/// Plays a recording, or writes only its last frame if stdout is no terminal for people.
 ///
 /// # Errors
-/// If a signal stops it. The terminal is as it was before in any case.
+/// Returns an error if a signal stops it. The terminal is restored in any case.
 pub fn play(console: &Console, walk: &Walk) -> Result<(), Error> {
     let variable = |name| std::env::var(name).unwrap_or_default();
     let depth = Depth::of(console.has_colour(), &variable("COLORTERM"), &variable("TERM"));
@@ -94,7 +94,7 @@ pub fn play(console: &Console, walk: &Walk) -> Result<(), Error> {
         }
         let now = terminal_size();
         if now != place {
-            // Its lines have been broken anew: begin on a clean screen.
+            // The terminal rewrapped the lines: begin on a clean screen.
             console.text("\x1b[2J\x1b[H");
             (place, shown) = (now, None);
             live = console.live().unwrap_or(live);
@@ -108,13 +108,13 @@ pub fn play(console: &Console, walk: &Walk) -> Result<(), Error> {
                 let line: String = format!("{word}   , . step   q quits").chars().take(columns).collect();
                 picture += &format!("\n{line}\x1b[K");
             }
-            // With keys, the terminal does not go back to the first column by itself.
+            // In raw mode, the terminal does not return to the first column by itself.
             live.show(&picture.replace('\n', "\r\n"));
         }
         if let Some(key) = screen.wait(TICK.saturating_sub(then.elapsed())) {
             player.press(key);
         }
-        // A key does not stop the clock, nor turn it faster.
+        // A key neither stops the clock nor makes it faster.
         let elapsed = then.elapsed();
         if elapsed >= TICK {
             player.pass(elapsed);
@@ -128,16 +128,14 @@ fn terminal_size() -> (u16, u16) {
     size().ok().filter(|(columns, rows)| *columns > 0 && *rows > 0).unwrap_or(USUAL)
 }
 
-/// Columns and rows of the picture: a free column and line so that nothing scrolls, and a line for
-/// the keys.
+/// Returns the picture's columns and rows, less a free column and line, and a line for the keys.
 fn view((columns, rows): (u16, u16), has_keys: bool) -> (usize, usize) {
     let free = if has_keys { 2 } else { 1 };
     let (columns, rows) = (usize::from(columns).saturating_sub(1), usize::from(rows).saturating_sub(free));
     (columns.clamp(1, LARGEST.0), rows.clamp(1, LARGEST.1))
 }
 
-/// The terminal while a film plays: no cursor, and keys at once. Ends as it was, however the film
-/// ends.
+/// The terminal during playback, without a cursor and with immediate keys. It is restored on drop.
 struct Screen<'c> {
     console: &'c Console,
     has_keys: bool,
@@ -150,7 +148,7 @@ impl<'c> Screen<'c> {
         Screen { console, has_keys }
     }
 
-    /// The next key that means something, if it comes in time.
+    /// Returns the next known key, if it comes in time.
     fn wait(&self, time: Duration) -> Option<Key> {
         let is_there = self.has_keys && event::poll(time).unwrap_or(false);
         if !is_there {
@@ -166,7 +164,7 @@ impl<'c> Screen<'c> {
 impl Drop for Screen<'_> {
     fn drop(&mut self) {
         if self.has_keys {
-            // Where that fails the terminal is gone.
+            // If that fails, the terminal is gone.
             let _ = disable_raw_mode();
         }
         self.console.text("\r\x1b[0m\x1b[?25h");

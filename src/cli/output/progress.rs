@@ -1,30 +1,30 @@
-//! Progress in words: how far, how long still, how fast.
+//! Progress in words: counts, remaining time, speed.
 
 use crate::base::number;
 use crate::base::observer::Generation;
 
-/// Seconds after which speed is measured anew, and how much must be done by then.
+/// Seconds after which the speed is measured anew, and how much must be done by then.
 const ANEW: (f64, u64) = (60.0, 10);
 
-/// Where something was one or two minutes ago, or when it began: speed and remaining time are
-/// measured from there, since work is not evenly fast and may have been suspended.
+/// A state of one or two minutes ago, or of the beginning. Speed and remaining time are measured
+/// from there, because work progresses unevenly and may have been suspended.
 #[derive(Clone, Copy, Debug)]
 pub struct Recent<T> {
     marks: [(f64, T); 2],
 }
 
 impl<T: Copy> Recent<T> {
-    /// It begins after so many seconds.
+    /// Begins after so many seconds.
     pub fn new(seconds: f64, begin: T) -> Self {
         Recent { marks: [(seconds, begin); 2] }
     }
 
-    /// Changes where it was, so that something counts as done before.
+    /// Changes the earlier state, so that something counts as done before.
     pub fn shift(&mut self, change: impl Fn(&mut T)) {
         self.marks.iter_mut().for_each(|(_, mark)| change(mark));
     }
 
-    /// Seconds from where it was to now, and what it was then; `done` counts what is done.
+    /// Returns the seconds since the earlier state, and that state; `done` counts completed items.
     pub fn since(&mut self, seconds: f64, now: T, done: impl Fn(&T) -> u64) -> (f64, T) {
         let [_, (then, mark)] = self.marks;
         if seconds - then >= ANEW.0 && done(&now).saturating_sub(done(&mark)) >= ANEW.1 {
@@ -35,16 +35,16 @@ impl<T: Copy> Recent<T> {
     }
 }
 
-/// How far something is: a label, and parts in the order in which they matter.
+/// A progress message: a label, and parts in order of importance.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Words {
-    /// What is going on.
+    /// The activity.
     pub label: String,
-    /// How much is done; how long it still takes, and so on.
+    /// The count, the remaining time, and so on.
     pub parts: Vec<String>,
 }
 
-/// How far an evolution is, given where it was some seconds ago.
+/// Describes the progress of an evolution, given its state some seconds ago.
 pub fn generation_line(now: &Generation, before: &Generation, seconds: f64) -> Words {
     let best = now.best.map_or("none".into(), |best| number::fixed(best, 2));
     let rate = rate(now.evaluations.saturating_sub(before.evaluations), seconds);
@@ -56,8 +56,8 @@ pub fn generation_line(now: &Generation, before: &Generation, seconds: f64) -> W
     Words { label: "generation".to_string(), parts }
 }
 
-/// How far some counted thing is: images, robots or, with the unit "bytes", megabytes. `before` of
-/// them were done some seconds ago.
+/// Describes the progress of something counted: images, robots or, with the unit "bytes",
+/// megabytes. `before` of them were done some seconds ago.
 pub fn count_line(label: &str, [before, done, total]: [u64; 3], unit: &str, seconds: f64) -> Words {
     let did = done.saturating_sub(before);
     let (counts, speed) = if unit == "bytes" {
@@ -84,7 +84,7 @@ fn left(before: u64, done: u64, total: u64, seconds: f64) -> Option<String> {
     (did > 0 && todo > 0).then(|| format!("{} left", duration(seconds * todo as f64 / did as f64)))
 }
 
-/// A time span in its two largest units: "45 s", "12 min 3 s", "3 h 20 min", "2 d 4 h".
+/// Formats a time span in its two largest units: "45 s", "12 min 3 s", "3 h 20 min", "2 d 4 h".
 pub fn duration(seconds: f64) -> String {
     let whole = if seconds.is_finite() { seconds.max(0.0).round() as u64 } else { 0 };
     let (minutes, hours, days) = (whole / 60, whole / 3600, whole / 86400);
@@ -102,7 +102,7 @@ pub fn duration(seconds: f64) -> String {
 pub struct Pacer(Option<(f64, f64)>);
 
 impl Pacer {
-    /// Whether a line is due, by seconds since the last one and by the share of the work done.
+    /// Returns true if a line is due, given the seconds since the start and the share of work done.
     pub fn is_due(&mut self, seconds: f64, share: f64) -> bool {
         let due = match self.0 {
             None => true,
@@ -144,7 +144,7 @@ mod tests {
         let bytes = line("train images", [0, 5_000_000, 10_000_000], "bytes", 2.0);
         assert_eq!(bytes, "train images: 5.0/10.0 MB, 2 s left, 2.5 MB/s");
         assert!(line("x", [0, 3, 0], "images", 0.0).contains("3/0"));
-        // What was known before took no time.
+        // Work known before took no time.
         assert_eq!(line("x", [40, 40, 50], "rollouts", 1e-9), "x: 40/50 rollouts, 0.0 rollouts/s");
         assert_eq!(line("x", [40, 45, 50], "rollouts", 5.0), "x: 45/50 rollouts, 5 s left, 1.0 rollouts/s");
     }
@@ -160,7 +160,7 @@ mod tests {
         assert_eq!(since(3670.0, 111), (3605.0, 100));
         assert_eq!(since(3700.0, 161), (3635.0, 100));
         assert_eq!(since(3730.0, 211), (60.0, 111));
-        // Slow things are measured over as long as it takes.
+        // Slow work is measured over as long as it takes.
         assert_eq!(since(7000.0, 215), (3330.0, 111));
     }
 

@@ -1,4 +1,4 @@
-//! [`Reporter`]: what the console shows while a command runs.
+//! [`Reporter`]: displays the progress of a command on the console.
 
 use crate::base::error::Error;
 use crate::base::observer::{Generation, Observer, Work};
@@ -6,13 +6,13 @@ use crate::cli::explain::{Explained, explain};
 use crate::cli::output::console::{Bar, Console, Counter};
 use std::sync::{PoisonError, RwLock};
 
-/// Shows on a console how a command goes on.
+/// Displays the progress of a command on a console.
 pub struct Reporter<'c> {
     console: &'c Console,
     line: RwLock<Line<'c>>,
 }
 
-/// What moves on the screen: one line at most.
+/// The moving part of the screen: at most one line.
 enum Line<'c> {
     None,
     Evolution(Bar<'c>),
@@ -20,7 +20,7 @@ enum Line<'c> {
 }
 
 impl<'c> Reporter<'c> {
-    /// Shows it on a console.
+    /// Creates a reporter on a console.
     pub fn new(console: &'c Console) -> Self {
         Reporter { console, line: RwLock::new(Line::None) }
     }
@@ -28,7 +28,7 @@ impl<'c> Reporter<'c> {
     fn show(&self, line: impl FnOnce() -> Line<'c>) {
         // A panic elsewhere is no reason to stop counting.
         let mut shown = self.line.write().unwrap_or_else(PoisonError::into_inner);
-        // The one before ends first.
+        // Ends the previous line first.
         *shown = Line::None;
         *shown = line();
     }

@@ -1,4 +1,4 @@
-//! What `morphcog response` says at its end, and its pictures.
+//! The results of `morphcog response`, and its pictures.
 
 use crate::base::number;
 use crate::base::number::percent;
@@ -10,7 +10,7 @@ use crate::robots::published;
 use crate::store::response::{EndedBy, RobotResponse};
 use std::path::Path;
 
-/// After a measurement: a line per robot.
+/// Writes the results of a measurement, a line per robot.
 pub fn response(console: &Console, finished: &Finished, out: &Path) {
     let Finished { file, stopped, unwritten, .. } = finished;
     let written = unwritten.is_none() && !file.robots.is_empty();
@@ -86,10 +86,10 @@ fn row(robot: &RobotResponse, is_taught: bool, has_window: bool) -> Vec<String> 
     row
 }
 
-/// The pictures of its robots.
+/// Writes the pictures of the robots.
 ///
 /// # Errors
-/// If one cannot be made or written.
+/// Returns an error if a picture cannot be made or written.
 pub fn pictures(console: &Console, finished: &Finished) -> Result<(), PictureError> {
     let Finished { file, pictures, .. } = finished;
     for (robot, [svg, png]) in file.robots.iter().zip(pictures) {

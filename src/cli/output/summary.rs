@@ -1,4 +1,4 @@
-//! What a command says at its end.
+//! The results of commands.
 
 use crate::analysis::published;
 use crate::base::clock::CLOCK;
@@ -23,11 +23,11 @@ use crate::store::validation::Validated;
 use crate::training;
 use std::path::Path;
 
-/// Robots shown after an evolution.
+/// The number of robots listed after an evolution.
 const SHOWN: usize = 5;
 
-/// After an evolution: the fittest robots, what was saved, and what to do next, unless the command
-/// itself goes on.
+/// Writes the results of an evolution: the fittest robots, the files and, unless the command itself
+/// continues, the next steps.
 pub fn evolution(console: &Console, finished: &Finished, out: &Path, goes_on: bool) {
     let Finished { run, totals, .. } = finished;
     if console.mode() == Mode::Json {
@@ -93,7 +93,7 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path, goes_on: bo
         return;
     }
     let archive = in_shell(&out.join(RUN_JSON));
-    // Gaits tell no images apart yet.
+    // Gaits cannot tell images apart yet.
     if run.config.measures_response() {
         return console.suggest("next:", &format!("morphcog train --archive {archive} --task \"4|9\""));
     }
@@ -101,7 +101,7 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path, goes_on: bo
     console.suggest("     ", &format!("morphcog eval --archive {archive}"));
 }
 
-/// After a training: the robot.
+/// Writes the results of a training.
 pub fn training(console: &Console, finished: &training::Finished, out: &Path) {
     let training::Finished { run, rollouts, size, .. } = finished;
     let Some(robot) = run.best() else { return };
@@ -126,7 +126,7 @@ pub fn training(console: &Console, finished: &training::Finished, out: &Path) {
     console.line(&format!("wrote {}", out.display()));
 }
 
-/// After robots were chosen on validation images: how the best did.
+/// Writes the results of the robots chosen on validation images.
 pub fn validation(console: &Console, best: &[Validated]) {
     if console.mode() == Mode::Json {
         return console.event("validated", &best);
@@ -138,9 +138,8 @@ pub fn validation(console: &Console, best: &[Validated]) {
     console.table(&["best on validation", "task", "correct", "balanced %"], &rows.collect::<Vec<_>>());
 }
 
-/// After an evaluation: a table per robot, the means and the baselines, and the paper's table;
-/// `capacity` is what is known from an analysis of these robots; `out` is the file, if it was
-/// written.
+/// Writes the results of an evaluation: a table per robot, the means, the baselines and the paper's
+/// table. `capacity` is a known analysis of these robots; `out` is the file, if it was written.
 pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&CapacityFile>, out: Option<&Path>) {
     if report.robots.is_empty() {
         return console.warning("no robot was evaluated");
@@ -229,7 +228,7 @@ pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&Capaci
     }
 }
 
-/// How fast this machine simulates.
+/// Writes the simulation speeds of this machine.
 pub fn speeds(console: &Console, speeds: &[Speed]) {
     if console.mode() == Mode::Json {
         return speeds.iter().for_each(|speed| console.event("speed", speed));
@@ -254,7 +253,7 @@ pub fn speeds(console: &Console, speeds: &[Speed]) {
     });
 }
 
-/// The published robots.
+/// Lists the published robots.
 pub fn gallery(console: &Console, robots: &[Published]) {
     let rows = robots.iter().map(|robot| {
         let counts = robot.body.counts();
@@ -267,7 +266,7 @@ pub fn gallery(console: &Console, robots: &[Published]) {
     console.info("watch one: morphcog replay --robot XFJPI (needs MNIST; or add --dataset builtin)");
 }
 
-/// The built-in configs: name and first comment.
+/// Lists the built-in configs: name and first comment.
 pub fn configs(console: &Console, configs: &[(&str, &str)]) {
     let rows = configs.iter().map(|(name, text)| {
         let about: Vec<&str> = text.lines().map_while(|line| line.strip_prefix("# ")).collect();
@@ -277,13 +276,13 @@ pub fn configs(console: &Console, configs: &[(&str, &str)]) {
     console.table(&["config", "what it is"], &rows.collect::<Vec<_>>());
 }
 
-/// The schemas: name, and what each is of.
+/// Lists the schemas: name and subject.
 pub fn schemas(console: &Console, schemas: &[(&str, &str)]) {
     let rows: Vec<_> = schemas.iter().map(|(name, of)| vec![name.to_string(), of.to_string()]).collect();
     console.table(&["schema", "what it is of"], &rows);
 }
 
-/// After a download.
+/// Writes the results of a download.
 pub fn fetched(console: &Console, files: &[Fetched]) {
     for file in files {
         let how = match &file.outcome {
@@ -294,7 +293,7 @@ pub fn fetched(console: &Console, files: &[Fetched]) {
     }
 }
 
-/// What was found of a dataset.
+/// Writes the facts about a dataset.
 pub fn dataset(console: &Console, found: &Found) {
     let info = &found.info;
     if console.mode() == Mode::Json {
@@ -339,7 +338,7 @@ pub fn dataset(console: &Console, found: &Found) {
     }
 }
 
-/// Displacements by class for people: one by one if they are few, else the mean of each class.
+/// Formats displacements by class for people: one by one if they are few, else the class means.
 fn walks(images: &[ImageRef], displacements: &[f64]) -> String {
     const FEW: usize = 8;
     let shown = images.iter().zip(displacements);

@@ -1,4 +1,4 @@
-//! What `sweep` and `reproduce` say of their tasks.
+//! The results of `sweep` and `reproduce`.
 
 use crate::base::error::Error;
 use crate::base::files::write_atomically;
@@ -18,7 +18,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use std::path::Path;
 
-/// How far tasks are: a line per task, and how many there are of each kind.
+/// Writes the status of tasks: a line per task, and the number in each state.
 pub fn status(console: &Console, all: &[Status]) {
     if console.mode() == Mode::Json {
         return all.iter().for_each(|status| console.event("task", status));
@@ -44,7 +44,7 @@ pub fn status(console: &Console, all: &[Status]) {
     console.line(&in_short(all));
 }
 
-/// How many tasks are done, running, and so on, and the computing time left.
+/// Counts the tasks in each state and estimates the remaining computing time.
 fn in_short(all: &[Status]) -> String {
     let count = |state: State| all.iter().filter(|status| status.state == state).count();
     let counts = State::ALL.map(|state| (count(state), state.name()));
@@ -59,10 +59,10 @@ fn in_short(all: &[Status]) -> String {
     format!("{}: {counts}{left}", counted(all.len(), "task", "tasks"))
 }
 
-/// Writes what a sweep found, and says it.
+/// Writes the results of a sweep to files and to the console.
 ///
 /// # Errors
-/// If a file cannot be written.
+/// Returns an error if a file cannot be written.
 pub fn collected(
     console: &Console,
     name: &str,
@@ -101,7 +101,7 @@ pub fn collected(
     Ok(())
 }
 
-/// A row for programs: the columns of `sweep.csv`, the plan's values in one object.
+/// A row for programs: the columns of `sweep.csv`, with the plan's values in one object.
 #[derive(Serialize)]
 struct Event<'a> {
     number: usize,
@@ -114,7 +114,7 @@ struct Event<'a> {
 
 impl<'a> Event<'a> {
     fn of(row: &'a Row) -> Self {
-        // They are kept as text: what is a number there is one here.
+        // Values are stored as text; numbers become numbers here.
         let value = |text: &str| serde_json::from_str(text).unwrap_or_else(|_| Value::from(text));
         let varied = row.varied.iter().map(|(key, text)| (key.clone(), value(text))).collect();
         Event { number: row.number, name: &row.name, state: row.state, varied, run: Columns::of(row) }
@@ -154,7 +154,7 @@ fn table(console: &Console, rows: &[Row]) {
     console.table(&headers, &rows.iter().map(row).collect::<Vec<_>>());
 }
 
-/// The keys in which runs differ, a line per group that differs in nothing but the seed.
+/// Writes the keys in which runs differ, a line per group that differs only in the seed.
 pub fn differences(console: &Console, runs: &[crate::commands::plot::Progress]) {
     let (keys, groups) = alike(runs);
     if groups.len() < 2 || console.mode() != Mode::Human {

@@ -4,12 +4,12 @@ use crate::cli::output::wrapping::{least_of_cell, width, wrapped_cell};
 
 /// Blanks between two columns.
 const GAP: usize = 2;
-/// Text of a cell is not broken into lines that are shorter than this, if it is longer.
+/// Cell text breaks into lines no shorter than this, if it is longer.
 const SHORT: usize = 24;
 
-/// The lines of a table as [`align`] makes them. Where they are wider than so many columns, headers
-/// and texts are broken between words; where that is not enough, the table goes on below, with its
-/// first column again; where not even two columns fit side by side, rows stand one below the other.
+/// Returns the lines of a table as [`align`] does, if they fit into `most` columns. Otherwise
+/// headers and texts break between words. If that is not enough, the table continues below,
+/// repeating its first column. If not even two columns fit side by side, rows are stacked.
 pub fn fitted(headers: &[&str], rows: &[Vec<String>], most: usize) -> Vec<String> {
     let columns: Vec<Column> = (0..headers.len()).map(|place| Column::new(headers, rows, place)).collect();
     let blocks = blocks(&columns, most);
@@ -19,20 +19,19 @@ pub fn fitted(headers: &[&str], rows: &[Vec<String>], most: usize) -> Vec<String
     blocks.iter().map(|block| drawn(block, &widths(block, most))).collect::<Vec<_>>().join(&String::new())
 }
 
-/// The lines of a table: headers, a rule, rows; two spaces between columns, numbers to the right.
-/// Short rows are filled up with empty cells; cells without a header are left out.
+/// Returns the lines of a table: headers, a rule, rows; two spaces between columns, numbers to the
+/// right. Short rows are filled with empty cells; cells without a header are left out.
 pub fn align(headers: &[&str], rows: &[Vec<String>]) -> Vec<String> {
     let columns: Vec<Column> = (0..headers.len()).map(|place| Column::new(headers, rows, place)).collect();
     let columns: Vec<&Column> = columns.iter().collect();
     drawn(&columns, &widths(&columns, usize::MAX))
 }
 
-/// A column of a table.
 struct Column<'a> {
     header: &'a str,
     cells: Vec<&'a str>,
     is_right: bool,
-    /// How wide it must be, and is if there is room.
+    /// The minimum width, and the width if there is room.
     least: usize,
     most: usize,
 }
@@ -57,18 +56,18 @@ impl<'a> Column<'a> {
     }
 }
 
-/// Columns that a table needs at least.
+/// Returns the minimum width of a table with these columns.
 fn needed(columns: &[&Column]) -> usize {
     columns.iter().map(|column| column.least).sum::<usize>() + GAP * columns.len().saturating_sub(1)
 }
 
-/// The columns of a table, or of the tables that stand one below the other instead.
+/// Splits columns into one table, or several tables that stand one below the other.
 fn blocks<'a, 'b>(columns: &'b [Column<'a>], most: usize) -> Vec<Vec<&'b Column<'a>>> {
     let mut blocks: Vec<Vec<&Column>> = vec![Vec::new()];
     for column in columns {
         let block = blocks.last_mut().expect("there is one from the beginning");
         block.push(column);
-        // The first column says what the row is about.
+        // The first column identifies the row.
         if block.len() > 2 && needed(block) > most {
             block.pop();
             blocks.push(vec![&columns[0], column]);
@@ -77,7 +76,7 @@ fn blocks<'a, 'b>(columns: &'b [Column<'a>], most: usize) -> Vec<Vec<&'b Column<
     blocks
 }
 
-/// How wide columns are: what is left of the room goes to those that need least, first.
+/// Distributes the width: columns that need the least get the remaining room first.
 fn widths(columns: &[&Column], most: usize) -> Vec<usize> {
     let mut room = most.saturating_sub(needed(columns));
     let mut widths: Vec<usize> = columns.iter().map(|column| column.least).collect();
@@ -85,7 +84,7 @@ fn widths(columns: &[&Column], most: usize) -> Vec<usize> {
     places.sort_by_key(|&place| columns[place].most - columns[place].least);
     for place in places {
         let more = columns[place].most - columns[place].least;
-        // Half of what it needs is of use to sentences only.
+        // Only sentences benefit from a part of the width that they need.
         let more = if columns[place].is_right && more > room { 0 } else { more.min(room) };
         (widths[place], room) = (widths[place] + more, room - more);
     }
@@ -100,8 +99,7 @@ fn drawn(columns: &[&Column], widths: &[usize]) -> Vec<String> {
         });
         padded.collect::<Vec<_>>().join(&" ".repeat(GAP)).trim_end().to_string()
     };
-    // A row of texts, each of some lines: those of headers stand at the bottom, right above their
-    // cells.
+    // A row of texts, each of several lines. Headers align at the bottom, right above their cells.
     let row = |texts: Vec<&str>, is_header: bool| -> Vec<String> {
         let cells: Vec<Vec<String>> =
             texts.iter().zip(widths).map(|(text, columns)| wrapped_cell(text, *columns)).collect();
@@ -126,8 +124,8 @@ fn drawn(columns: &[&Column], widths: &[usize]) -> Vec<String> {
     lines
 }
 
-/// Rows one below the other, a cell behind its header, or below it if there is no room; an empty line
-/// between two rows. Empty cells are left out.
+/// Stacks rows, each cell behind its header, or below it if there is no room; an empty line
+/// separates rows. Empty cells are left out.
 fn stacked(headers: &[&str], rows: &[Vec<String>], most: usize) -> Vec<String> {
     let widest = headers.iter().map(|header| width(header)).max().unwrap_or(0);
     let longest = rows.iter().flatten().map(|cell| least_of_cell(cell)).max().unwrap_or(0);
@@ -152,8 +150,8 @@ fn stacked(headers: &[&str], rows: &[Vec<String>], most: usize) -> Vec<String> {
     rows.iter().map(row).collect::<Vec<_>>().join(&String::new())
 }
 
-/// Starts like a number, perhaps with a sign, and has a digit: "−3.2", "76.5 %", "12/30", "81.0
-/// [78.4, 83.3]".
+/// Returns true if a text starts like a number, with an optional sign, and has a digit: "−3.2",
+/// "76.5 %", "12/30", "81.0 [78.4, 83.3]".
 fn is_number(text: &str) -> bool {
     let body = text.trim_start_matches(['+', '-', '−', '±', '<', '>', '≤', '≥', '.', ' ']);
     let unit = |c: char| c.is_ascii_digit() || " .,%/()[]–-−+±:eEµmskhMGB×".contains(c);
@@ -218,7 +216,7 @@ mod tests {
             "a            99.0       9",
         ];
         assert_eq!(fitted(&headers, &rows, 25), expected);
-        // A cell that is wide in a terminal counts as it is there.
+        // A cell counts with its width in a terminal.
         assert_eq!(align(&["a", "b"], &[vec!["雪".to_string(), "x".to_string()]])[1..], ["--  -", "雪  x"]);
     }
 

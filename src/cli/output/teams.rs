@@ -1,4 +1,4 @@
-//! What `morphcog team` says at its end, and its pictures.
+//! The results of `morphcog team`, and its pictures.
 
 use crate::base::error::Error;
 use crate::base::number::percent;
@@ -9,11 +9,11 @@ use crate::draw::report::decisions::{figures, remarks, table};
 use crate::store::team::{Decoded, FIGURES, Member, TeamFile, figure};
 use std::path::Path;
 
-/// After a test: a line per robot, the answers of the team, what answers the same images without
+/// Writes the results of a test: a line per robot, the team's answers, the baselines without
 /// bodies, and pictures beside `out`, if that was written.
 ///
 /// # Errors
-/// If a picture cannot be made or written.
+/// Returns an error if a picture cannot be made or written.
 pub fn team(console: &Console, file: &TeamFile, out: Option<&Path>) -> Result<(), Error> {
     let pictures = match out.filter(|_| file.answers.is_some()) {
         Some(out) => pictures(file, out)?,
@@ -65,7 +65,7 @@ fn answers(console: &Console, file: &TeamFile) {
     remarks(file).iter().for_each(|line| console.line(line));
 }
 
-/// Writes the confusion matrix and the poster of all bodies; their paths.
+/// Writes the confusion matrix and the poster of all bodies; returns their paths.
 fn pictures(file: &TeamFile, out: &Path) -> Result<Vec<String>, Error> {
     let mut written = Vec::new();
     for (name, drawn) in FIGURES.into_iter().zip([plot::confusion(file), plot::poster(file)]) {

@@ -1,4 +1,4 @@
-//! A frame of a recording as text, for a live view in a terminal.
+//! Renders a frame of a recording as text, for a live view in a terminal.
 
 use crate::body::Material;
 use crate::draw::colour;
@@ -6,10 +6,10 @@ use crate::draw::colour::Colour;
 use crate::draw::panel::readout;
 use crate::draw::walk::{Walk, area};
 
-/// Columns of the stimulus' corner are only taken from views at least this wide.
+/// The minimum width, columns, of a view with the stimulus in a corner.
 const WIDE: usize = 40;
 
-/// What one pixel of the view shows.
+/// The content of one pixel of the view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Pixel {
     Sky,
@@ -20,19 +20,19 @@ enum Pixel {
     Image(f64),
 }
 
-/// What colours a terminal has.
+/// The colour depth of a terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Depth {
-    /// None: letters stand for materials.
+    /// No colours: letters stand for materials.
     Plain,
-    /// 256 of a fixed palette.
+    /// 256 colours of a fixed palette.
     Indexed,
-    /// 24 bits.
+    /// 24-bit colours.
     Full,
 }
 
 impl Depth {
-    /// From what the environment says: whether colours are wanted at all, `COLORTERM`, `TERM`.
+    /// Infers the depth from the environment: whether colours are wanted, `COLORTERM` and `TERM`.
     pub fn of(is_wanted: bool, colorterm: &str, term: &str) -> Self {
         let full = ["direct", "kitty", "alacritty", "foot", "ghostty", "wezterm"];
         match () {
@@ -44,7 +44,7 @@ impl Depth {
         }
     }
 
-    /// The sequence that sets the colours of a half block's upper and lower half.
+    /// Returns the sequence that sets the colours of a half block's upper and lower half.
     fn sequence(self, [upper, lower]: [[u8; 3]; 2]) -> String {
         if self == Depth::Indexed {
             return format!("\x1b[38;5;{};48;5;{}m", indexed(upper), indexed(lower));
@@ -54,7 +54,7 @@ impl Depth {
     }
 }
 
-/// The number of the nearest of the 256 colours: a cube of 6 × 6 × 6, or one of 24 grays.
+/// Returns the nearest of the 256 colours: from a cube of 6 × 6 × 6, or one of 24 grays.
 fn indexed(rgb: [u8; 3]) -> u8 {
     const LEVELS: [u8; 6] = [0, 95, 135, 175, 215, 255];
     let distance =
@@ -66,9 +66,9 @@ fn indexed(rgb: [u8; 3]) -> u8 {
     if gray.0 < cube.0 { gray.1 } else { cube.1 }
 }
 
-/// A frame as exactly `rows` lines of exactly `columns` characters, joined by newlines: a line of
-/// read-outs, then the world, followed by the camera. With colours, two pixels a character (half
-/// blocks); without, plain ASCII: `#` rigid, `:` soft, `/` and `\` muscles, `-` and `+` sensors.
+/// Renders a frame as `rows` lines of exactly `columns` characters, joined by newlines: a line of
+/// read-outs, then the world, with a moving camera. With colours, a character has two pixels (half
+/// blocks). In ASCII, `#` is rigid, `:` soft, `/` and `\` muscles, `-` and `+` sensors.
 pub fn frame(walk: &Walk, frame: usize, columns: usize, rows: usize, depth: Depth) -> String {
     let colour = depth != Depth::Plain;
     let (columns, rows) = (columns.min(1000), rows.min(1000));
@@ -101,7 +101,7 @@ pub fn frame(walk: &Walk, frame: usize, columns: usize, rows: usize, depth: Dept
     lines.join("\n")
 }
 
-/// The view as rows of pixels, top row first; a pixel is `tall` times as high as wide.
+/// Returns the view as rows of pixels, top row first; a pixel is `tall` times as high as wide.
 fn pixels(walk: &Walk, frame: usize, columns: usize, rows: usize, tall: f64) -> Vec<Pixel> {
     if columns == 0 || rows == 0 {
         return vec![];
@@ -109,7 +109,7 @@ fn pixels(walk: &Walk, frame: usize, columns: usize, rows: usize, tall: f64) -> 
     let first = walk.extent(0..1);
     let (width, top) = ((first.right - first.left).clamp(1.0, 128.0), first.top.clamp(1.0, 128.0));
     let ground = 1 + rows / 16;
-    // Pixels per voxel length: the robot with as much free ground beside it, and some sky above.
+    // Pixels per voxel length: the robot, as much free ground beside it, and some sky above.
     let scale = (columns as f64 / (2.0 * width + 4.0))
         .min((rows - ground.min(rows - 1)) as f64 * tall / (1.2 * top + 1.0));
     let left = ((walk.centre(frame)[0] * scale).round() - (columns / 2) as f64) / scale;
@@ -146,7 +146,7 @@ fn pixels(walk: &Walk, frame: usize, columns: usize, rows: usize, tall: f64) -> 
     out
 }
 
-/// Whether a point lies in a quadrilateral: an odd number of its sides are to the right.
+/// Returns true if a quadrilateral contains a point: an odd number of its sides are to the right.
 fn contains(quad: &[[f64; 2]; 4], [x, y]: [f64; 2]) -> bool {
     let crossed = |k: &usize| {
         let ([ax, ay], [bx, by]) = (quad[*k], quad[(k + 1) % 4]);
@@ -191,7 +191,7 @@ mod tests {
     use super::*;
     use crate::draw::simulated;
 
-    /// The visible characters of every line.
+    /// Counts the visible characters of every line.
     fn visible(text: &str) -> Vec<usize> {
         let strip = |line: &str| {
             let mut pieces = line.split('\x1b');

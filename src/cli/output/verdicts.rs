@@ -1,4 +1,4 @@
-//! What `morphcog audit` says at its end.
+//! The results of `morphcog audit`.
 
 use crate::base::number;
 use crate::base::text::counted;
@@ -7,7 +7,7 @@ use crate::commands::audit::Finished;
 use crate::store::audit::{AuditFile, RobotAudit, Verdict};
 use std::path::Path;
 
-/// After an audit: a line per robot, how many there are of each verdict, and what breaks walks.
+/// Writes an audit's results: a line per robot, the verdict counts, and changes that break walks.
 pub fn audit(console: &Console, finished: &Finished, out: &Path) {
     let Finished { file, asked, known, stopped, unwritten, .. } = finished;
     let robots: Vec<&RobotAudit> = asked.iter().filter_map(|id| file.robot(id)).collect();
@@ -71,7 +71,7 @@ fn row(robot: &RobotAudit) -> Vec<String> {
     ]
 }
 
-/// For every change, in how many robots the walk does not persist.
+/// Counts, for every change, the robots whose walk does not persist.
 fn breaking(console: &Console, robots: &[&RobotAudit]) {
     let mut names: Vec<&str> = Vec::new();
     let rollouts = || robots.iter().flat_map(|robot| &robot.rollouts);

@@ -1,48 +1,47 @@
-//! Text for a terminal of so many columns. Lines break between words, and a command goes on after a
-//! backslash, so that it can be copied. A word that is wider than the terminal has a line of its own.
+//! Wraps text to a terminal's columns. Lines break between words, and a command continues after a
+//! backslash, so that it can be copied. A word wider than the terminal has a line of its own.
 
 use unicode_width::UnicodeWidthStr;
 
-/// How much farther to the right than a line its continuation begins.
+/// The indentation of continuation lines.
 const INDENT: usize = 2;
-/// What a line of a command ends with where the command goes on.
+/// The end of a line whose command continues.
 const GOES_ON: &str = " \\";
 
-/// What is never broken.
+/// An unbreakable piece of text.
 #[derive(Debug)]
 struct Word {
-    /// Blanks before it.
+    /// The blanks before the word.
     gap: usize,
     text: String,
-    /// It belongs to the same command as the word before.
+    /// True if it belongs to the same command as the previous word.
     continues: bool,
 }
 
-/// What a text is, which says where its lines may break.
+/// The kind of a text, which decides where its lines may break.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
-    /// Sentences; what stands in backticks is a command.
+    /// Sentences, with commands in backticks.
     Prose,
-    /// A command: what it has in quotes is one word.
+    /// A command, in which quoted text is one word.
     Command,
-    /// A cell of a table. If it has items with two blanks between them, they stay whole.
+    /// A cell of a table; items separated by two blanks stay whole.
     Cell,
 }
 
-/// Columns that a text takes; what sets colours takes none.
+/// Returns the columns that a text takes; colour sequences take none.
 pub fn width(text: &str) -> usize {
     let mut parts = text.split('\x1b');
     let first = parts.next().map_or(0, UnicodeWidthStr::width);
     first + parts.map(|part| part.split_once('m').map_or(0, |(_, seen)| seen.width())).sum::<usize>()
 }
 
-/// The lines of a text that is one line; those after the first are indented. What stands in
-/// backticks is a command.
+/// Wraps a one-line text and indents the continuation. Text in backticks is a command.
 pub fn wrapped(text: &str, columns: usize) -> Vec<String> {
     fill(&words(text, Kind::Prose), INDENT, columns)
 }
 
-/// The lines of a command behind what is said of it, as "next:", which may be blanks to align it.
+/// Wraps a command behind a label such as "next:", which may be blanks to align it.
 pub fn wrapped_command(about: &str, command: &str, columns: usize) -> Vec<String> {
     let mut all = words(about, Kind::Prose);
     let mut command = words(command, Kind::Command);
@@ -54,18 +53,18 @@ pub fn wrapped_command(about: &str, command: &str, columns: usize) -> Vec<String
     fill(&all, INDENT, columns)
 }
 
-/// The lines of a cell of a table.
+/// Wraps a cell of a table.
 pub fn wrapped_cell(text: &str, columns: usize) -> Vec<String> {
     fill(&words(text, Kind::Cell), 0, columns)
 }
 
-/// Columns that a cell of a table takes at least.
+/// Returns the minimum columns of a table cell.
 pub fn least_of_cell(text: &str) -> usize {
     words(text, Kind::Cell).iter().map(|word| width(&word.text)).max().unwrap_or(0)
 }
 
-/// A label and parts in one line: of the parts, the first and those behind it that have room; of a
-/// label that is too long, beginning and end.
+/// Joins a label and parts in one line: the first part always, later ones if they fit. A label that
+/// is too long keeps its beginning and end.
 pub fn one_of(label: &str, parts: &[String], columns: usize) -> String {
     let (first, others) = parts.split_first().map_or(("", parts), |(first, others)| (first, others));
     let label = shortened(label, columns.saturating_sub(width(first) + 1));
@@ -80,7 +79,7 @@ pub fn one_of(label: &str, parts: &[String], columns: usize) -> String {
     line
 }
 
-/// A text, or its beginning and end, in so many columns; nothing if there is no room for that.
+/// Shortens a text to its beginning and end if necessary; returns nothing if that does not fit.
 fn shortened(text: &str, columns: usize) -> String {
     let characters: Vec<char> = text.chars().collect();
     let ends = |half: usize| -> String {
@@ -94,7 +93,7 @@ fn shortened(text: &str, columns: usize) -> String {
     }
 }
 
-/// The words of a text. A per cent sign stays with its number, or what it is of.
+/// Splits a text into words. A per cent sign stays with its number, or with what follows it.
 fn words(text: &str, kind: Kind) -> Vec<Word> {
     let least_gap = if kind == Kind::Cell && text.contains("  ") { 2 } else { 1 };
     let (mut is_command, mut quote) = (kind == Kind::Command, None);
@@ -119,7 +118,7 @@ fn words(text: &str, kind: Kind) -> Vec<Word> {
             _ if quote == Some(c) => quote = None,
             _ => {}
         }
-        // A backslash in single quotes is one.
+        // In single quotes a backslash is literal.
         is_escaped = c == '\\' && is_command && !is_escaped && quote != Some('\'');
     }
     words
@@ -158,7 +157,7 @@ fn fill(words: &[Word], indent: usize, columns: usize) -> Vec<String> {
     lines
 }
 
-/// Whether what is left of a command from a word on does not fit into the line.
+/// Returns true if the rest of a command, from a word on, does not fit into the line.
 fn is_broken(unit: &[Word], place: usize, line: &str, columns: usize) -> bool {
     let left: usize = unit[place..].iter().map(|word| word.gap + width(&word.text)).sum();
     width(line) + left > columns

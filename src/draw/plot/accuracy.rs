@@ -9,11 +9,11 @@ use crate::draw::{fonts, plot::scales};
 use crate::store::eval::{EvalFile, RobotReport};
 use std::collections::BTreeSet;
 
-/// Robots that have a line of their own with their name; of more, lines are thin and nameless.
+/// Up to so many robots each have a line with a name; with more, lines are thin and nameless.
 const NAMED: usize = 40;
 
-/// The accuracy of every robot on test or validation images with its 95 % interval, a block per
-/// task, with the mean and what takes no body.
+/// Plots the accuracy of every robot on test or validation images with its 95 % interval, a block
+/// per task, with the mean and the baselines, which need no body.
 pub fn accuracy(report: &EvalFile) -> Figure {
     let mut canvas = Canvas::new();
     let of = format!("{}; {}", runs(report), report.selection());
@@ -61,7 +61,7 @@ pub fn accuracy(report: &EvalFile) -> Figure {
     Figure::new(&format!("Accuracy: {of}"), [COLUMN, height], canvas)
 }
 
-/// The runs in words: name and seeds, or how many they are if they have several names.
+/// Names the runs: name and seeds, or their number if they have several names.
 fn runs(report: &EvalFile) -> String {
     let Some(seeds) = seeds(report) else { return format!("{} runs", report.runs.len()) };
     let word = if seeds.len() > 1 { "seeds" } else { "seed" };
@@ -69,7 +69,7 @@ fn runs(report: &EvalFile) -> String {
     format!("{}, {word} {}", report.run, seeds.join(", "))
 }
 
-/// The seeds of the runs; none if these have several names: then a seed does not say which is meant.
+/// Returns the seeds of the runs, or `None` if the runs have several names and seeds are ambiguous.
 fn seeds(report: &EvalFile) -> Option<BTreeSet<u64>> {
     match report.runs.as_slice() {
         [] => Some(BTreeSet::from([report.run_seed])),
@@ -80,7 +80,7 @@ fn seeds(report: &EvalFile) -> Option<BTreeSet<u64>> {
     }
 }
 
-/// What a robot is called: its id, and of several seeds that of its own run.
+/// Returns a robot's id, with the seed of its run if there are several seeds.
 fn name(report: &EvalFile, robot: &RobotReport) -> String {
     let has_several = seeds(report).is_some_and(|seeds| seeds.len() > 1);
     match report.runs.get(robot.run).filter(|_| has_several) {
@@ -102,13 +102,13 @@ fn dot(canvas: &mut Canvas, plot: &Plot, robot: &RobotReport, y: f64, named: boo
 }
 
 const MEAN: Pen = Pen { colour: scales::VERMILLION, width: 1.2, dashes: None };
-/// How much covers the interval of the mean.
+/// Opacity of the interval around the mean.
 const BAND: u8 = 46;
 const LARGER: Pen = Pen { colour: colour::INK, width: 0.9, dashes: Some([3.0, 2.0]) };
 const PIXEL: Pen = Pen { colour: colour::INK, width: 0.9, dashes: Some([0.9, 1.6]) };
 const NEAREST: Pen = Pen { colour: colour::INK, width: 0.9, dashes: Some([7.0, 1.6]) };
 
-/// Mean of a task's robots with its interval, and the baselines.
+/// Draws the mean of a task's robots with its interval, and the baselines.
 fn lines(canvas: &mut Canvas, plot: &Plot, report: &EvalFile, task: &str, [from, to]: [f64; 2]) {
     let x = |share: f64| plot.place([percent(share), 0.0])[0];
     if let Some(mean) = report.means.get(task) {
@@ -126,13 +126,13 @@ fn lines(canvas: &mut Canvas, plot: &Plot, report: &EvalFile, task: &str, [from,
     }
 }
 
-/// What the lines mean, in two columns; the y below.
+/// Draws the legend in two columns; returns the y below.
 fn legend(canvas: &mut Canvas, report: &EvalFile, top: f64) -> f64 {
     let value = |text: &str, share: Option<f64>| match share {
         Some(share) => format!("{text} {} %", number::fixed(percent(share), 1)),
         None => text.to_string(),
     };
-    // Of several tasks each has its own numbers.
+    // With several tasks each has its own numbers, which the legend leaves out.
     let mean = report.means.values().next().filter(|_| report.means.len() == 1);
     let baselines = report.baselines.values().next().filter(|_| report.baselines.len() == 1);
     let has_interval = report.means.values().any(|mean| mean.interval.is_some());

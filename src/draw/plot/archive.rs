@@ -1,7 +1,7 @@
 //! The figure of an archive: fitness over muscle, sensor and total voxels.
 //!
-//! A map has a square for every pair of muscle and sensor bins, and in it a strip for every bin of
-//! the total. A cell that could have an elite is framed; where no body can be there is nothing.
+//! A map has a square for every pair of muscle and sensor bins, divided into strips by the bin of
+//! the total. Cells that could hold an elite are framed; impossible ones stay blank.
 
 use crate::body::Material;
 use crate::draw::colour;
@@ -15,13 +15,13 @@ use crate::qd::descriptor::{COUNT_BINS, DescriptorSpace, count_bin, possible_cel
 use crate::store::run::RunFile;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Space left of and below a map, points.
+/// Space to the left of and below a map, points.
 const LEFT: f64 = 30.0;
 const BELOW: f64 = 24.0;
-/// What the strips are.
+/// Caption of the strips.
 const STRIPS: [&str; 2] = ["strips in a square:", "total voxels, few to many"];
 
-/// Fitness of the elites of a run, one map per task.
+/// Plots the fitness of the elites of a run, one map per task.
 pub fn archive(run: &RunFile) -> Figure {
     let tasks = run.dimensions.tasks.len().max(1);
     let scale = Scale::of(run);
@@ -77,14 +77,14 @@ pub fn archive(run: &RunFile) -> Figure {
     Figure::new(&format!("Archive: {of}"), [width, height + MARGIN], canvas)
 }
 
-/// From fitness to colour: what is right on the training images is coloured, what is not is gray.
+/// Maps fitness to colour: walkers that are right on the training images are coloured, others gray.
 struct Scale {
     right: Axis,
-    /// Lowest fitness, if some elite is below nothing.
+    /// Lowest fitness, if some elite is below zero.
     lowest: Option<f64>,
-    /// Whether a cell is without an elite.
+    /// True if a possible cell has no elite.
     is_open: bool,
-    /// What fitness is measured in.
+    /// The unit of fitness.
     unit: Option<&'static str>,
 }
 
@@ -110,7 +110,8 @@ impl Scale {
     }
 }
 
-/// One map. `cell`: whether there can be an elite, and its fitness if there is one.
+/// Draws one map. `cell` returns `None` where no elite is possible, `Some(None)` where one is
+/// missing, or the elite's fitness.
 fn map(
     canvas: &mut Canvas,
     [x, y]: [f64; 2],
@@ -150,15 +151,14 @@ fn map(
     }
 }
 
-/// What marks fitness below 0: a gray alone could be taken for a colour by colour-blind eyes.
+/// The line through cells with fitness below 0: colour-blind viewers could take gray for a colour.
 const STROKE: Pen = Pen { colour: colour::INK, width: 0.5, dashes: None };
 
-/// The diagonal of a cell.
 fn stroke([x, y]: [f64; 2], [width, height]: [f64; 2]) -> Piece {
     Piece::Line(vec![[x, y + height], [x + width, y]])
 }
 
-/// Numbers of voxels at which bins begin.
+/// Returns the voxel counts at which bins begin.
 fn edges(area: usize) -> Vec<usize> {
     (0..COUNT_BINS).filter_map(|bin| (0..=area).find(|&count| count_bin(count, area) == bin)).collect()
 }
@@ -186,7 +186,7 @@ fn axes(canvas: &mut Canvas, [x, y]: [f64; 2], side: f64, run: &RunFile, is_firs
     }
 }
 
-/// What colours mean; `is_above` a map that leaves little room.
+/// Draws the legend; `is_above` if it lies over a map, which leaves little room.
 fn legend(canvas: &mut Canvas, [x, y]: [f64; 2], width: f64, scale: &Scale, is_above: bool) {
     let name = scale.unit.map_or("fitness".to_string(), |unit| format!("fitness [{unit}]"));
     colour_bar(canvas, [x, y + 4.0], width - 6.0, &scale.right, &name, |value| scale.colour(value));

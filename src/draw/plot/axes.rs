@@ -22,21 +22,21 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// A range that holds all of low … high and ends on ticks, with about this number of them.
+    /// Returns a range that covers low … high and ends on ticks, with about this number of them.
     pub fn nice(low: f64, high: f64, about: usize) -> Self {
         let Axis { from, to, step } = Axis::stepped(low, high, about);
-        // What ends on a tick but for rounding stays.
+        // Ends that miss a tick only by rounding stay.
         let slack = 1e-9 * step;
         let down = ((from + slack) / step).floor() * step;
         let up = ((to - slack) / step).ceil() * step;
         Axis { from: down, to: up, step }
     }
 
-    /// The range low … high, with about this number of ticks in it.
+    /// Returns exactly the range low … high, with about this number of ticks in it.
     pub fn exact(low: f64, high: f64, about: usize) -> Self {
         let axis = Axis::stepped(low, high, about);
-        // One tick is no scale; a step longer than both sides of zero leaves zero alone. With about six, steps
-        // are shorter than half the range, and there are two ticks wherever it begins.
+        // A single tick gives no scale: a step longer than both sides leaves only zero. With about
+        // six, steps are shorter than half the range, so there are two ticks wherever it begins.
         if axis.ticks().len() > 1 { axis } else { Axis::stepped(low, high, 6) }
     }
 
@@ -50,37 +50,37 @@ impl Axis {
         Axis { from: low, to: high, step: factor * power }
     }
 
-    /// The same with ticks on whole numbers only.
+    /// Restricts ticks to whole numbers.
     pub fn whole(self) -> Self {
         Axis { step: self.step.max(1.0), ..self }
     }
 
-    /// The ticks.
+    /// Returns the positions of the ticks.
     pub fn ticks(&self) -> Vec<f64> {
         let first = (self.from / self.step - 1e-6).ceil();
         let count = ((self.to / self.step + 1e-6).floor() - first).clamp(-1.0, 100.0) as i32;
         (0..=count).map(|k| (first + f64::from(k)) * self.step).collect()
     }
 
-    /// A number as it stands at a tick.
+    /// Formats a number for a tick.
     pub fn label(&self, value: f64) -> String {
         let decimals = (-libm::log10(self.step).floor()).clamp(0.0, 6.0) as usize;
         grouped(&number::fixed(value, decimals))
     }
 
-    /// Width of the widest number, points.
+    /// Returns the width of the widest tick label, points.
     pub fn labels_width(&self) -> f64 {
         let widths = self.ticks().into_iter().map(|tick| fonts::width(&self.label(tick), TEXT, false));
         widths.fold(0.0, f64::max)
     }
 
-    /// Where a value is: 0 at the beginning of the axis, 1 at its end.
+    /// Returns the position of a value: 0 at the beginning of the axis, 1 at its end.
     pub fn share(&self, value: f64) -> f64 {
         (value - self.from) / (self.to - self.from)
     }
 }
 
-/// Digits in groups of three, and a real minus.
+/// Groups digits in threes and uses a real minus sign.
 fn grouped(text: &str) -> String {
     let (sign, digits) = text.strip_prefix('-').map_or(("", text), |digits| ("−", digits));
     let (whole, rest) = digits.split_at(digits.find('.').unwrap_or(digits.len()));
@@ -104,12 +104,12 @@ pub struct Plot {
 }
 
 impl Plot {
-    /// Where a pair of values is, points.
+    /// Maps a pair of values to a point of the figure, in points.
     pub fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [self.at[0] + self.x.share(x) * self.size[0], self.at[1] + (1.0 - self.y.share(y)) * self.size[1]]
     }
 
-    /// Lines across the plot at the ticks.
+    /// Draws grid lines at the ticks.
     pub fn grid(&self, canvas: &mut Canvas, across: bool, up: bool) {
         let pen = Pen::new(scales::GRID, 0.5);
         let [left, top] = self.at;
@@ -123,7 +123,7 @@ impl Plot {
         }
     }
 
-    /// The lower axis, with its name below.
+    /// Draws the lower axis, with its name below.
     pub fn lower_axis(&self, canvas: &mut Canvas, name: Option<&str>) {
         let bottom = self.at[1] + self.size[1];
         let pen = Pen::new(colour::INK, LINE);
@@ -141,12 +141,12 @@ impl Plot {
         }
     }
 
-    /// The left axis, with its name beside it.
+    /// Draws the left axis, with its name beside it.
     pub fn left_axis(&self, canvas: &mut Canvas, name: &str) {
         self.left_axis_beside(canvas, name, self.y.labels_width());
     }
 
-    /// The same with room for numbers so wide: the names of several plots stand below each other.
+    /// Draws the left axis with a fixed room for labels, so that names of stacked plots line up.
     pub fn left_axis_beside(&self, canvas: &mut Canvas, name: &str, labels: f64) {
         let [left, top] = self.at;
         let pen = Pen::new(colour::INK, LINE);
@@ -165,17 +165,17 @@ impl Plot {
 /// Space for a lower axis and its name, points.
 pub const AXIS: f64 = 21.5;
 
-/// Space for a left axis and its name, points, if the numbers on it are so wide.
+/// Returns the space for a left axis and its name, points, if the labels have this width.
 pub fn left_space(labels: f64) -> f64 {
     labels + TICK + GAP + 4.0 + TEXT + 2.0
 }
 
-/// What the figure shows (bold), and of what; the y below it.
+/// Draws the title (bold) and the subject `of` below; returns the y below them.
 pub fn heading(canvas: &mut Canvas, title: &str, of: &str, width: f64) -> f64 {
     heading_in_lines(canvas, title, of, width, 1)
 }
 
-/// The same with up to `count` lines for what it is of.
+/// Draws the same as [`heading`], with up to `count` lines for the subject.
 pub fn heading_in_lines(canvas: &mut Canvas, title: &str, of: &str, width: f64, count: usize) -> f64 {
     const LINE: f64 = 9.5;
     let most = width - 2.0 * MARGIN;
@@ -188,10 +188,10 @@ pub fn heading_in_lines(canvas: &mut Canvas, title: &str, of: &str, width: f64, 
     MARGIN + 24.0 + LINE * (lines.len() - 1) as f64
 }
 
-/// Distance of everything from the figure's edges, points.
+/// Margin at the figure's edges, points.
 pub const MARGIN: f64 = 5.0;
 
-/// A horizontal bar of colours with its axis below and its name above.
+/// Draws a horizontal bar of colours with its axis below and its name above.
 pub fn colour_bar(
     canvas: &mut Canvas,
     [x, y]: [f64; 2],
@@ -207,7 +207,7 @@ pub fn colour_bar(
         let share = |k: u32| f64::from(k) / f64::from(STEPS);
         let value =
             axis.from + share(k) * (axis.to - axis.from) + 0.5 * (axis.to - axis.from) / f64::from(STEPS);
-        // Each a little wider, so that no light shines through.
+        // Slightly wider steps leave no gaps for light to shine through.
         let wide = if k + 1 < STEPS { width / f64::from(STEPS) + 0.4 } else { width / f64::from(STEPS) };
         canvas.rectangle([x + width * share(k), y], [wide, size[1]], colour_of(value));
     }

@@ -13,7 +13,7 @@ use crate::draw::plot::{robot, scales};
 /// Side of the map, points.
 const MAP: f64 = 132.0;
 
-/// A body's voxels by material, with a legend that counts them. `of` says whose it is.
+/// Plots a body's voxels by material, with a legend that counts them. `of` names the robot.
 pub fn body(body: &Body, of: &str) -> Figure {
     let mut canvas = Canvas::new();
     let top = heading(&mut canvas, "Body", of, COLUMN) + 2.0;

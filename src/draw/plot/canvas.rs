@@ -1,38 +1,38 @@
-//! [`Canvas`]: what a figure shows, in points, y down. `svg` and `pixels` draw it.
+//! [`Canvas`]: the content of a figure, in points, y down. `svg` and `pixels` render it.
 
 use crate::base::text::shortened;
 use crate::draw::colour;
 use crate::draw::colour::Colour;
 use crate::draw::fonts;
 
-/// Most characters of a text.
+/// Maximum number of characters in a text.
 const MOST: usize = 400;
 
-/// Size of most words, points: the least that is easily read in print.
+/// Size of most words, points: the smallest that is easy to read in print.
 pub const TEXT: f64 = 7.2;
 /// Size of headings, points.
 pub const HEADING: f64 = 8.2;
 
-/// Where a text is held.
+/// The part of a text that is fixed at its position.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Anchor {
-    /// By its left end.
+    /// The left end.
     #[default]
     Start,
-    /// By its middle.
+    /// The middle.
     Middle,
-    /// By its right end.
+    /// The right end.
     End,
 }
 
-/// How a text looks.
+/// The style of a text.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Words {
     pub size: f64,
     pub bold: bool,
     pub colour: Colour,
     pub anchor: Anchor,
-    /// Whether it runs upwards.
+    /// True if the text runs upwards.
     pub upwards: bool,
 }
 
@@ -43,28 +43,28 @@ impl Default for Words {
 }
 
 impl Words {
-    /// Held by its middle.
+    /// Returns the default style, anchored in the middle.
     pub fn middle() -> Self {
         Words { anchor: Anchor::Middle, ..Words::default() }
     }
 
-    /// Held by its right end.
+    /// Returns the default style, anchored at the right end.
     pub fn end() -> Self {
         Words { anchor: Anchor::End, ..Words::default() }
     }
 
-    /// The same in another colour.
+    /// Sets the colour.
     pub fn colour(self, colour: Colour) -> Self {
         Words { colour, ..self }
     }
 
-    /// The same in bold.
+    /// Makes the text bold.
     pub fn bold(self) -> Self {
         Words { bold: true, ..self }
     }
 }
 
-/// How a line looks.
+/// The style of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pen {
     pub colour: Colour,
@@ -74,18 +74,17 @@ pub struct Pen {
 }
 
 impl Pen {
-    /// A solid line.
+    /// Creates a pen for solid lines.
     pub fn new(colour: Colour, width: f64) -> Self {
         Pen { colour, width, dashes: None }
     }
 
-    /// The same dashed.
+    /// Makes the line dashed.
     pub fn dashed(self, dash: f64, gap: f64) -> Self {
         Pen { dashes: Some([dash, gap]), ..self }
     }
 }
 
-/// What is drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Element {
     Rectangle {
@@ -107,12 +106,12 @@ pub(super) enum Element {
         text: String,
         words: Words,
     },
-    /// See-through as a whole.
+    /// Drawn with an opacity as a whole.
     Faded {
         opacity: f64,
         content: Canvas,
     },
-    /// Cut at the edges of a rectangle.
+    /// Clipped to a rectangle.
     Clipped {
         at: [f64; 2],
         size: [f64; 2],
@@ -120,7 +119,6 @@ pub(super) enum Element {
     },
 }
 
-/// The inside of a shape, or its line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Ink {
     Fill(Colour),
@@ -132,57 +130,57 @@ pub(super) enum Ink {
 pub enum Piece {
     /// A line through points.
     Line(Vec<[f64; 2]>),
-    /// The same back to its first point.
+    /// A line through points and back to the first.
     Polygon(Vec<[f64; 2]>),
     /// A rectangle from its top left corner.
     Rectangle {
-        /// The corner.
+        /// The top left corner.
         at: [f64; 2],
         /// Width and height.
         size: [f64; 2],
     },
-    /// A line to the right.
+    /// A horizontal line to the right.
     Level {
-        /// Its left end.
+        /// The left end.
         from: [f64; 2],
-        /// How long it is.
+        /// The length.
         length: f64,
     },
 }
 
-/// A picture under construction: what is drawn, in order, in points.
+/// A picture under construction: its elements in drawing order, in points.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Canvas {
     elements: Vec<Element>,
 }
 
 impl Canvas {
-    /// Nothing yet.
+    /// Creates an empty canvas.
     pub fn new() -> Self {
         Canvas::default()
     }
 
-    /// What was drawn, in order.
+    /// Returns the elements in drawing order.
     pub(super) fn elements(&self) -> &[Element] {
         &self.elements
     }
 
-    /// A filled rectangle from its top left corner.
+    /// Draws a filled rectangle from its top left corner.
     pub fn rectangle(&mut self, at: [f64; 2], size: [f64; 2], fill: Colour) {
         self.elements.push(Element::Rectangle { at, size, ink: Ink::Fill(fill) });
     }
 
-    /// The outline of a rectangle.
+    /// Draws the outline of a rectangle.
     pub fn frame(&mut self, at: [f64; 2], size: [f64; 2], pen: Pen) {
         self.elements.push(Element::Rectangle { at, size, ink: Ink::Line(pen) });
     }
 
-    /// A line between two points.
+    /// Draws a line between two points.
     pub fn line(&mut self, from: [f64; 2], to: [f64; 2], pen: Pen) {
         self.path(vec![Piece::Line(vec![from, to])], pen);
     }
 
-    /// A line through points; pieces where a point is not finite are left out.
+    /// Draws a line through points, with gaps where a point is not finite.
     pub fn polyline(&mut self, points: &[[f64; 2]], pen: Pen) {
         let finite = |p: &[f64; 2]| p.iter().all(|v| v.is_finite());
         let pieces = points.split(|p| !finite(p)).filter(|piece| piece.len() > 1);
@@ -192,40 +190,40 @@ impl Canvas {
         }
     }
 
-    /// A path's line.
+    /// Draws the line of a path.
     pub fn path(&mut self, pieces: Vec<Piece>, pen: Pen) {
         self.elements.push(Element::Path { pieces, ink: Ink::Line(pen) });
     }
 
-    /// A filled path.
+    /// Draws a filled path.
     pub fn area(&mut self, pieces: Vec<Piece>, fill: Colour) {
         self.elements.push(Element::Path { pieces, ink: Ink::Fill(fill) });
     }
 
-    /// A filled circle.
+    /// Draws a filled circle.
     pub fn dot(&mut self, at: [f64; 2], radius: f64, fill: Colour) {
         self.elements.push(Element::Dot { at, radius, fill });
     }
 
-    /// A text on its baseline; no more of it than any figure has room for.
+    /// Draws a text on its baseline, shortened to what any figure has room for.
     pub fn text(&mut self, at: [f64; 2], text: &str, words: Words) {
         let text = shortened(text, MOST).chars().map(printable).collect();
         self.elements.push(Element::Text { at, text, words });
     }
 
-    /// A text cut to fit into `most` points.
+    /// Draws a text, cut to fit into `most` points.
     pub fn fitted(&mut self, at: [f64; 2], text: &str, most: f64, words: Words) {
         self.text(at, &fonts::fitted(text, words.size, words.bold, most), words);
     }
 
-    /// What `draw` draws, see-through as a whole.
+    /// Draws the content of `draw` with an opacity as a whole.
     pub fn faded(&mut self, opacity: f64, draw: impl FnOnce(&mut Canvas)) {
         let mut content = Canvas::new();
         draw(&mut content);
         self.elements.push(Element::Faded { opacity, content });
     }
 
-    /// What `draw` draws, cut at the edges of a rectangle; its coordinates stay the figure's.
+    /// Draws the content of `draw`, clipped to a rectangle; coordinates stay those of the figure.
     pub fn clipped(&mut self, at: [f64; 2], size: [f64; 2], draw: impl FnOnce(&mut Canvas)) {
         let mut content = Canvas::new();
         draw(&mut content);
@@ -233,12 +231,12 @@ impl Canvas {
     }
 }
 
-/// A number that can be drawn, even if it is not finite or absurd.
+/// Clamps a number to what can be drawn; NaN becomes 0.
 pub(super) fn drawable(value: f64) -> f64 {
     if value.is_nan() { 0.0 } else { value.clamp(-1e6, 1e6) }
 }
 
-/// A letter that can be drawn and that XML has a place for.
+/// Replaces letters that cannot be drawn or that XML forbids.
 pub(super) fn printable(letter: char) -> char {
     let is_lost = letter.is_control() || matches!(letter, '\u{fffe}' | '\u{ffff}');
     if is_lost { '\u{fffd}' } else { letter }

@@ -1,5 +1,5 @@
-//! The figure of the morphological cognition capacity: accuracy of networks over their size, and
-//! the robots'.
+//! The figure of the morphological cognition capacity: the accuracy of networks over their size,
+//! and the robots' accuracy.
 
 use crate::baseline::curve::Crossing;
 use crate::draw::colour;
@@ -17,8 +17,8 @@ const ROBOTS: Pen = Pen { colour: scales::VERMILLION, width: 1.1, dashes: None }
 const FIT: Pen = Pen { colour: colour::INK, width: 0.9, dashes: None };
 const CROSSING: Pen = Pen { colour: scales::VERMILLION, width: 0.9, dashes: Some([2.5, 1.8]) };
 
-/// Mean accuracy of networks over their size with its standard deviation, the fit of degree two,
-/// the robots' accuracy and where the fit reaches it; a panel per task and kind of network.
+/// Plots the mean accuracy of networks over their size with its standard deviation, the quadratic
+/// fit, the robots' accuracy and where the two meet; a panel per task and kind of network.
 pub fn capacity(file: &CapacityFile) -> Figure {
     let panels: Vec<(&TaskCapacity, &Curve)> =
         file.tasks.iter().flat_map(|task| task.curves.iter().map(move |curve| (task, curve))).collect();
@@ -41,7 +41,7 @@ pub fn capacity(file: &CapacityFile) -> Figure {
     Figure::new(&format!("Morphological cognition capacity: {of}"), [width, height], canvas)
 }
 
-/// One axis for all panels, so that they can be compared.
+/// Returns one axis for all panels, so that they are comparable.
 fn accuracies(panels: &[(&TaskCapacity, &Curve)]) -> Axis {
     let values = panels.iter().flat_map(|(task, curve)| {
         let points = curve.points.iter();
@@ -52,7 +52,7 @@ fn accuracies(panels: &[(&TaskCapacity, &Curve)]) -> Axis {
     Axis::nice(100.0 * low.max(0.0), 100.0 * high.min(1.0), 5)
 }
 
-/// A standard deviation below and above a point; the point itself if it is unknown.
+/// Returns a point's mean minus and plus its standard deviation, which is 0 if it is unknown.
 fn bar(point: &Point) -> [f64; 2] {
     let deviation = point.standard_deviation.unwrap_or(0.0);
     [point.mean - deviation, point.mean + deviation]
@@ -71,7 +71,7 @@ fn panel(canvas: &mut Canvas, at: [f64; 2], size: [f64; 2], y: &Axis, task: &Tas
     let largest = sizes().fold(1.0, f64::max);
     let plot = Plot { at, size, x: Axis::exact(0.0, largest + 1.0, 5).whole(), y: y.clone() };
     let (kind, unit) = network(curve);
-    // Where the smallest size is above the robots already, nothing crosses.
+    // If the smallest size already exceeds the robots, nothing crosses.
     let (found, crossing) = match curve.capacity {
         Some(below @ Crossing::Below { .. }) => {
             (format!("capacity {below}: the curve begins above the robots"), None)
@@ -79,7 +79,7 @@ fn panel(canvas: &mut Canvas, at: [f64; 2], size: [f64; 2], y: &Axis, task: &Tas
         Some(at @ Crossing::At(size)) => (format!("capacity {at} {unit}"), Some(size)),
         None => ("no capacity: the curve never reaches the robots".to_string(), None),
     };
-    // Half of the room is for the words beside it.
+    // Half of the room is for the words beside the title.
     let title = fonts::fitted(&task.task, Words::default().size, true, 0.4 * size[0]);
     let title = format!("{title}, {kind}");
     canvas.text([at[0], at[1] - 5.0], &title, Words::default().bold());
@@ -110,7 +110,7 @@ fn panel(canvas: &mut Canvas, at: [f64; 2], size: [f64; 2], y: &Axis, task: &Tas
     plot.lower_axis(canvas, Some(unit));
 }
 
-/// What points and lines mean; the y below.
+/// Draws the legend; returns the y below.
 fn legend(canvas: &mut Canvas, trainings: usize, [x, top]: [f64; 2], width: f64) -> f64 {
     let lines = [
         (Pen::new(scales::BLUE.with_opacity(120), 0.8), format!("mean ± sd of {trainings} trainings")),
@@ -181,7 +181,7 @@ mod tests {
         assert_eq!(svg.matches("capacity 16.8").count(), 4);
         assert!(svg.contains("01|23, CNN") && svg.contains("hidden neurons") && svg.contains("kernels"));
         assert!(capacity(&file(None)).svg().contains("never reaches"));
-        // Robots that know less than any network: nothing is marked where nothing crosses.
+        // The robots are worse than any network: nothing crosses, so nothing is marked.
         let mut below = file(Some(Crossing::Below { below: 1.0 }));
         below.tasks.iter_mut().for_each(|task| task.accuracy = 0.3);
         let below = capacity(&below).svg();

@@ -1,4 +1,4 @@
-//! [`Figure`]: a vector picture, written as SVG, or as PNG with fonts of its own.
+//! [`Figure`]: a vector picture, written as SVG, or as PNG with embedded fonts.
 
 use crate::draw::colour;
 use crate::draw::error::PictureError;
@@ -13,20 +13,19 @@ pub const COLUMN: f64 = 241.0;
 pub const PAGE: f64 = 504.0;
 /// Pixels per inch of pictures for print.
 pub const PRINT: u32 = 300;
-/// Most pixels on a side of a PNG.
+/// Maximum number of pixels on a side of a PNG.
 const MOST_PIXELS: f64 = 16_000.0;
 
-/// What is behind a figure.
+/// The background of a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Background {
     /// White.
     Paper,
-    /// Whatever the figure is laid on.
+    /// Transparent: the page behind shows through.
     Transparent,
 }
 
-/// A vector picture. Its SVG has neither ids nor classes nor styles, so any number of them can
-/// stand in one page.
+/// A vector picture. Its SVG has no ids, classes or styles: a page can hold any number of them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
     title: String,
@@ -36,29 +35,28 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// A figure of a width and height in points; `content` is drawn in points from the top left
-    /// corner.
+    /// Creates a figure of a width and height in points, the content's origin at the top left.
     pub(super) fn new(title: &str, size: [f64; 2], content: Canvas) -> Self {
         Figure { title: title.to_string(), size, content, background: Background::Paper }
     }
 
-    /// The same on another background.
+    /// Sets the background.
     #[must_use]
     pub fn on(self, background: Background) -> Self {
         Figure { background, ..self }
     }
 
-    /// Width and height in points.
+    /// Returns the width and height in points.
     pub fn size(&self) -> [f64; 2] {
         self.size
     }
 
-    /// What it shows, in a line.
+    /// Returns the title, a single line.
     pub fn title(&self) -> &str {
         &self.title
     }
 
-    /// The figure as SVG: one element `svg`, to be written into a file or into a page.
+    /// Returns the figure as SVG: one element `svg`, for a file or for a page.
     pub fn svg(&self) -> String {
         let [width, height] = self.size.map(number);
         let title = escape(&self.title);
@@ -77,26 +75,26 @@ impl Figure {
         )
     }
 
-    /// The most pixels per inch, up to `dpi`, with which its PNG does not have too many on a side.
+    /// Returns the largest resolution up to `dpi`, pixels per inch, at which a PNG is possible.
     pub fn fitting(&self, dpi: u32) -> u32 {
         let longest = self.size.into_iter().fold(1.0, f64::max);
-        // One pixel less: what is cut by the edge counts as a pixel, too.
+        // One pixel less, because a pixel cut by the edge counts too.
         dpi.min(((MOST_PIXELS - 1.0) * 72.0 / longest) as u32).max(1)
     }
 
-    /// The figure as PNG for print: with [`PRINT`] pixels per inch, or as many as it can have.
+    /// Returns the figure as PNG for print, with [`PRINT`] pixels per inch or as many as possible.
     ///
     /// # Errors
-    /// As [`png`](Figure::png).
+    /// Returns the errors of [`png`](Figure::png).
     pub fn print(&self) -> Result<Vec<u8>, PictureError> {
         self.png(self.fitting(PRINT))
     }
 
-    /// The figure as PNG with `dpi` pixels per inch; the file says how large it is meant to be.
+    /// Returns the figure as PNG with `dpi` pixels per inch; the file states its intended size.
     ///
     /// # Errors
-    /// [`PictureError::Figure`] if it would have no pixels or too many, [`PictureError::Encode`] if
-    /// it cannot be made.
+    /// Returns [`PictureError::Figure`] if it would have no pixels or too many, or
+    /// [`PictureError::Encode`] if encoding fails.
     pub fn png(&self, dpi: u32) -> Result<Vec<u8>, PictureError> {
         let scale = f64::from(dpi) / 72.0;
         let [width, height] = self.size.map(|points| (points * scale).ceil());

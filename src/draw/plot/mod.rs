@@ -1,7 +1,7 @@
-//! Figures for print and pages: every one a function from what it shows to a [`Figure`].
+//! Figures for print and pages. Each is a function from its data to a [`Figure`].
 //!
-//! `canvas` holds what is drawn, `svg` and `pixels` draw it; `axes` and `scales` are what figures
-//! share; `robot` draws bodies. The sizes are those of a journal's column or page, the words in them at least 7 points high.
+//! `canvas` holds the elements, `svg` and `pixels` render them; figures share `axes` and `scales`;
+//! `robot` draws bodies. Sizes fit a journal's column or page; words have 7 points, captions less.
 
 mod accuracy;
 mod archive;

@@ -1,4 +1,4 @@
-//! [`Canvas`] → pixels.
+//! Renders a [`Canvas`] to pixels.
 
 use crate::draw::fonts;
 use crate::draw::plot::canvas::{Anchor, Canvas, Element, Ink, Pen, Piece, Words, drawable};
@@ -9,13 +9,13 @@ use tiny_skia::{
 };
 
 impl Canvas {
-    /// Draws its elements; `to_pixels` turns points into pixels.
+    /// Draws the elements; `to_pixels` maps points to pixels.
     pub fn draw(&self, pixmap: &mut Pixmap, to_pixels: Transform) {
         for element in self.elements() {
             match element {
                 Element::Rectangle { at, size, ink } => {
                     if let Some(rectangle) = rectangle(*at, *size) {
-                        // SVG's corners of a frame are sharp.
+                        // SVG draws the corners of a frame sharp.
                         inked(pixmap, &PathBuilder::from_rect(rectangle), ink, LineJoin::Miter, to_pixels);
                     }
                 }
@@ -107,7 +107,7 @@ fn lettered(pixmap: &mut Pixmap, at: [f64; 2], text: &str, words: &Words, to_pix
     }
 }
 
-/// Draws apart, and lays what is in an area \[pixels\] of it over the picture.
+/// Draws `content` on a layer of its own and composites an area \[pixels\] of it over the picture.
 fn layer(pixmap: &mut Pixmap, area: Option<Rect>, content: &Canvas, opacity: f32, to_pixels: Transform) {
     let Some(area) = area else { return };
     let edge = |v: f32, most: u32| v.clamp(0.0, most as f32);

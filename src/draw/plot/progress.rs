@@ -11,10 +11,10 @@ use crate::store::metrics::Moment;
 
 /// Height of a panel, points.
 const PANEL: f64 = 62.0;
-/// Points of a curve: more than a column's pixels at 150 per inch would not be seen.
+/// Points of a curve: more would be invisible in a column at 150 pixels per inch.
 const SAMPLES: usize = 400;
 
-/// A panel: its name, what it shows of a moment, and its colour.
+/// A panel: its name, its value at a moment, and its colour.
 type Quantity = (&'static str, fn(&Moment) -> f64, Colour);
 
 const QUANTITIES: [Quantity; 3] = [
@@ -23,15 +23,15 @@ const QUANTITIES: [Quantity; 3] = [
     ("best fitness", |moment| moment.obj_max.unwrap_or(f64::NAN), scales::VERMILLION),
 ];
 
-/// Groups that have a line of their own in the legend: as many as look different.
+/// The maximum number of groups with a line in the legend: as many as look different.
 const NAMED: usize = scales::SET.len() * DASHES.len();
 
 /// Dashes of lines, and the gaps between them; the first is solid.
 const DASHES: [Option<[f64; 2]>; 4] = [None, Some([4.0, 1.6]), Some([1.0, 1.6]), Some([2.5, 4.0])];
 
-/// QD score, coverage and best fitness of runs over their evaluations. Runs that differ in nothing
-/// but the seed are one line, their median, in a band from the least to the largest, as far as the
-/// shortest of them goes; other runs have lines and colours of their own.
+/// Plots the QD score, coverage and best fitness of runs over their evaluations. Runs that differ
+/// only in the seed become one line, their median, in a band from the least to the largest value,
+/// up to the end of the shortest. Other runs have lines and colours of their own.
 pub fn progress(runs: &[Progress]) -> Figure {
     let (_, groups) = alike(runs);
     let mut canvas = Canvas::new();
@@ -59,7 +59,7 @@ pub fn progress(runs: &[Progress]) -> Figure {
         let size = [COLUMN - MARGIN - 8.0 - left, PANEL];
         let plot = Plot { at: [left, top], size, x: x.clone(), y };
         plot.grid(&mut canvas, true, false);
-        // The first on top: no line without a name hides one that has one.
+        // The first on top: no nameless line hides a named one.
         for (number, (group, bands)) in groups.iter().zip(&bands).enumerate().rev() {
             let pen = if groups.len() > 1 { pen(number) } else { Pen::new(colour, 1.2) };
             draw(&mut canvas, &plot, bands, pen, group.runs.len() > 1);
@@ -81,15 +81,15 @@ pub fn progress(runs: &[Progress]) -> Figure {
     Figure::new(&format!("Progress: {of}"), [COLUMN, height], canvas)
 }
 
-/// Evaluations as far as all runs of a group go.
+/// Returns the evaluations that all runs of a group reach.
 fn end(group: &Group) -> f64 {
     let of = |run: &&Progress| run.moments.last().map_or(0.0, |moment| moment.evaluations);
     let shortest = group.runs.iter().map(of).fold(f64::INFINITY, f64::min);
     if shortest.is_finite() { shortest } else { 0.0 }
 }
 
-/// The line of a group: a colour, and, when the colours are used up, other dashes; gray for what has
-/// no name.
+/// Returns the line style of a group: a colour, other dashes once the colours are used up, and gray
+/// for groups without a name.
 fn pen(number: usize) -> Pen {
     let colour = scales::SET[number % scales::SET.len()];
     match DASHES.get(number / scales::SET.len()) {
@@ -98,7 +98,7 @@ fn pen(number: usize) -> Pen {
     }
 }
 
-/// What the lines mean; the y below.
+/// Draws the legend; returns the y below.
 fn legend(canvas: &mut Canvas, groups: &[Group], top: f64) -> f64 {
     let mut y = top;
     for (number, group) in groups.iter().enumerate().take(NAMED) {
@@ -120,7 +120,7 @@ fn legend(canvas: &mut Canvas, groups: &[Group], top: f64) -> f64 {
     y
 }
 
-/// The runs in a line: their names and seeds, each once.
+/// Names the runs in a line: their names and seeds, each once.
 fn names(runs: &[Progress]) -> String {
     let mut parts = Vec::<(String, Vec<String>)>::new();
     for run in runs {
@@ -137,7 +137,7 @@ fn names(runs: &[Progress]) -> String {
     parts.into_iter().map(part).collect::<Vec<_>>().join("; ")
 }
 
-/// Least, median and largest value at a number of evaluations.
+/// The least, median and largest value at a number of evaluations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Band {
     at: f64,
@@ -146,7 +146,7 @@ struct Band {
     high: f64,
 }
 
-/// The bands from the first moment that all runs have to the last.
+/// Returns the bands from the first moment that all runs have to `end`.
 fn bands(runs: &[&Progress], quantity: fn(&Moment) -> f64, end: f64) -> Vec<Band> {
     let first = |run: &&Progress| run.moments.first().map_or(0.0, |moment| moment.evaluations);
     let start = runs.iter().map(first).fold(0.0, f64::max).min(end);

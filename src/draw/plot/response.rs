@@ -14,12 +14,11 @@ use crate::store::response::{EndedBy, RobotResponse};
 /// Side of the map, points.
 const MAP: f64 = 132.0;
 
-/// How much of a material's colour is left beside the slopes' colours, which are what the map
-/// shows.
+/// The share of a material's colour that remains, so that the slopes' colours stand out.
 const FADED: f64 = 0.55;
 
-/// The slopes of a robot's soft voxels and sensors over its body. `of` says whose it is, `task`
-/// what `taught` is about.
+/// Plots the slopes of a robot's soft voxels and sensors over its body. `of` names the robot,
+/// `task` the task that `taught` estimates.
 pub fn response(found: &RobotResponse, task: Option<&str>, of: &str) -> Figure {
     let mut canvas = Canvas::new();
     let body = &found.body;
@@ -79,7 +78,7 @@ pub fn response(found: &RobotResponse, task: Option<&str>, of: &str) -> Figure {
     Figure::new(&format!("Response: {of}"), [COLUMN, below + 19.0 + MARGIN], canvas)
 }
 
-/// What stands beside the map.
+/// Returns the notes beside the map.
 fn notes(found: &RobotResponse, task: Option<&str>) -> Vec<String> {
     let places = found.places.len();
     let certain = found.places.iter().filter(|place| !place.is_uncertain()).count();
@@ -99,7 +98,6 @@ fn notes(found: &RobotResponse, task: Option<&str>) -> Vec<String> {
     notes
 }
 
-/// A diagonal cross in a square.
 fn cross([x, y]: [f64; 2], side: f64) -> [Piece; 2] {
     let [near, far] = [0.25 * side, 0.75 * side];
     [
@@ -108,7 +106,7 @@ fn cross([x, y]: [f64; 2], side: f64) -> [Piece; 2] {
     ]
 }
 
-/// A colour mixed with the paper's.
+/// Mixes a colour with the paper's.
 fn faded(fill: Colour) -> Colour {
     let mix = |k: usize| {
         let (own, paper) = (f64::from(fill.rgb[k]), f64::from(colour::PAPER.rgb[k]));

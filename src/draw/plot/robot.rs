@@ -1,4 +1,4 @@
-//! Bodies, poses and stimuli as figures draw them.
+//! Bodies, poses and stimuli in figures.
 
 use crate::base::Grid;
 use crate::body::{Body, Material};
@@ -9,17 +9,16 @@ use crate::draw::plot::scales;
 use crate::draw::walk::{Walk, area};
 use std::collections::BTreeMap;
 
-/// Shades of a material in a figure: more could not be told apart in print.
+/// Shades of a material in a figure: more would look alike in print.
 const SHADES: f64 = 6.0;
 
-/// A material's colour at rest.
+/// Returns a material's colour at rest.
 pub fn plain(material: Material) -> Colour {
     let [_, [red, green, blue], _] = colour::tones(material);
     Colour::new(red, green, blue)
 }
 
-/// Squares of equal colour as one path each, so that a figure stays small; thin paper-white seams
-/// between them.
+/// Draws squares with thin paper-white seams; squares of equal colour form one path, to save bytes.
 pub fn squares(
     canvas: &mut Canvas,
     [left, top]: [f64; 2],
@@ -38,10 +37,10 @@ pub fn squares(
     }
 }
 
-/// Side of a cell from which on materials are marked, points.
+/// The cell size, points, from which materials are marked.
 const MARKED: f64 = 4.5;
 
-/// The marks of the materials of a body's cells, over squares of these colours.
+/// Draws the marks of the materials of a body's cells, over squares of these colours.
 pub fn marks(
     canvas: &mut Canvas,
     [left, top]: [f64; 2],
@@ -59,7 +58,7 @@ pub fn marks(
     stroked(canvas, cell, cells.map(|(place, material)| (material, corners(place), fill(material))));
 }
 
-/// The marks of voxels, `cell` points wide, as one path for each colour.
+/// Draws the marks of voxels, `cell` points wide, as one path for each colour.
 fn stroked(canvas: &mut Canvas, cell: f64, voxels: impl Iterator<Item = (Material, [[f64; 2]; 4], Colour)>) {
     let mut paths = BTreeMap::<([u8; 3], u8), Vec<Piece>>::new();
     for (material, corners, fill) in voxels {
@@ -74,7 +73,7 @@ fn stroked(canvas: &mut Canvas, cell: f64, voxels: impl Iterator<Item = (Materia
     }
 }
 
-/// The outline of the cells of a grid for which something holds.
+/// Outlines the cells of a grid for which `holds` returns true.
 pub fn outline(
     canvas: &mut Canvas,
     [left, top]: [f64; 2],
@@ -104,17 +103,17 @@ pub fn outline(
     }
 }
 
-/// The outline of a body.
+/// Draws the outline of a body.
 pub fn body_outline(canvas: &mut Canvas, at: [f64; 2], cell: f64, body: &Body, pen: Pen) {
     outline(canvas, at, cell, [body.height(), body.width()], |r, c| !body.at(r, c).is_empty(), pen);
 }
 
-/// A stimulus, `side` points on its longer side, framed; its width and height.
+/// Draws a framed stimulus, `side` points on its longer side; returns its width and height.
 pub fn stimulus(canvas: &mut Canvas, at: [f64; 2], side: f64, image: &Grid<f64>) -> [f64; 2] {
     let cell = side / image.height().max(image.width()).max(1) as f64;
     let size = [cell * image.width() as f64, cell * image.height() as f64];
     canvas.rectangle(at, size, Colour::gray(0.0));
-    // Sixteen grays are enough here; a seam of less than nothing hides the lines between squares.
+    // Sixteen grays suffice here; a negative seam hides the lines between squares.
     let gray = |intensity: f64| Colour::gray((intensity * 15.0).round() / 15.0);
     let lit = image.iter().map(|(place, intensity)| (place, gray(*intensity)));
     canvas.clipped(at, size, |canvas| {
@@ -124,8 +123,8 @@ pub fn stimulus(canvas: &mut Canvas, at: [f64; 2], side: f64, image: &Grid<f64>)
     size
 }
 
-/// The body at a frame: voxels in the colour of their material, darker the smaller they are, with
-/// their outline.
+/// Draws the body at a frame with its outline: voxels in the colour of their material, darker the
+/// smaller they are.
 pub fn pose(canvas: &mut Canvas, walk: &Walk, frame: usize, place: impl Fn([f64; 2]) -> [f64; 2]) {
     let [small, _, large] = colour::TONE_AREAS;
     let mut paths = BTreeMap::<[u8; 3], Vec<Piece>>::new();
@@ -152,7 +151,7 @@ pub fn pose(canvas: &mut Canvas, walk: &Walk, frame: usize, place: impl Fn([f64;
     }
 }
 
-/// Squares with their meanings, one below the other; the y below the last.
+/// Draws squares with their meanings, one below the other; returns the y below the last.
 pub fn legend<'a>(
     canvas: &mut Canvas,
     [x, y]: [f64; 2],

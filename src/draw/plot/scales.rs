@@ -1,4 +1,4 @@
-//! Colours of figures: sets and scales that stay apart for colour-blind eyes.
+//! Colours of figures: sets and scales that colour-blind viewers can tell apart.
 
 use crate::draw::colour::Colour;
 
@@ -8,7 +8,7 @@ pub const BLUE: Colour = Colour::new(0, 114, 178);
 pub const VERMILLION: Colour = Colour::new(213, 94, 0);
 /// Bluish green of Okabe & Ito's set.
 pub const GREEN: Colour = Colour::new(0, 158, 115);
-/// Colours for lines that stand for themselves: Okabe & Ito's set without its yellow.
+/// Colours for separate lines: Okabe & Ito's set without its yellow.
 pub const SET: [Colour; 6] = [
     BLUE,
     VERMILLION,
@@ -17,7 +17,7 @@ pub const SET: [Colour; 6] = [
     Colour::new(86, 180, 233),
     Colour::new(230, 159, 0),
 ];
-/// Lines that help the eye.
+/// Grid lines.
 pub const GRID: Colour = Colour::new(226, 228, 232);
 /// Lines around cells.
 pub const CELL: Colour = Colour::new(190, 194, 200);
@@ -37,8 +37,7 @@ const VIRIDIS: [[u8; 3]; 11] = [
     [0xfd, 0xe7, 0x25],
 ];
 
-/// Purple over white to green (ColorBrewer's PRGn), the middle for nothing: neither is a muscle's
-/// colour.
+/// Purple over white (zero) to green (ColorBrewer's PRGn): neither end is a muscle's colour.
 const PURPLE_GREEN: [[u8; 3]; 9] = [
     [0x76, 0x2a, 0x83],
     [0x99, 0x70, 0xab],
@@ -51,25 +50,25 @@ const PURPLE_GREEN: [[u8; 3]; 9] = [
     [0x1b, 0x78, 0x37],
 ];
 
-/// Grays from dark to light, for what is below a scale.
+/// Grays from dark to light, for values below a scale.
 const GRAYS: [[u8; 3]; 2] = [[0x60, 0x62, 0x68], [0xc4, 0xc6, 0xca]];
 
-/// The colour at `t` in [0, 1] of a scale from dark to bright.
+/// Returns the colour at `t` in [0, 1] of a scale from dark to bright.
 pub fn sequential(t: f64) -> Colour {
     between(&VIRIDIS, t)
 }
 
-/// The colour at `t` in [−1, 1] of a scale with a middle.
+/// Returns the colour at `t` in [−1, 1] of a scale with a neutral middle.
 pub fn diverging(t: f64) -> Colour {
     between(&PURPLE_GREEN, (t + 1.0) / 2.0)
 }
 
-/// The gray at `t` in [0, 1], from dark to light.
+/// Returns the gray at `t` in [0, 1], from dark to light.
 pub fn below(t: f64) -> Colour {
     between(&GRAYS, t)
 }
 
-/// Colours in equal steps, those between them mixed.
+/// Interpolates between equally spaced colours; `t` is in [0, 1].
 fn between(colours: &[[u8; 3]], t: f64) -> Colour {
     let t = if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) } * (colours.len() - 1) as f64;
     let low = (t.floor() as usize).min(colours.len() - 2);

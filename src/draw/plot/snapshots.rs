@@ -19,11 +19,11 @@ const LARGEST: f64 = 7.0;
 /// Opacity of the first pose.
 const FAINTEST: f64 = 0.22;
 
-/// Poses of a simulation, `every` number of control steps (0: chosen by the walk), earlier ones
-/// fainter; a panel per stimulus. `of` says whose it is.
+/// Plots poses of a simulation, one per `every` control steps (0: chosen from the walk), earlier
+/// ones fainter; a panel per stimulus. `of` names the robot.
 ///
 /// # Errors
-/// [`PictureError::Recording`] if the recording cannot be drawn.
+/// Returns [`PictureError::Recording`] if the recording cannot be drawn.
 pub fn snapshots(recording: &Recording, every: usize, of: &str) -> Result<Figure, PictureError> {
     let walk = Walk::new(recording)?;
     let phases = recording.phases.len();
@@ -35,7 +35,7 @@ pub fn snapshots(recording: &Recording, every: usize, of: &str) -> Result<Figure
     let title = format!("Snapshots every {every} control steps{rest}");
     let top = heading(&mut canvas, &title, of, width);
     let wide = (width - 2.0 * MARGIN - (columns - 1) as f64 * 12.0) / columns as f64;
-    // All panels have one scale; each begins where its walk does.
+    // All panels share one scale; each begins where its walk does.
     let reach = (0..phases).map(|phase| reach(&walk, phase));
     let [left, right, highest] =
         reach.fold([0.0, 0.0, 1.0f64], |a, b| [a[0].min(b[0]), a[1].max(b[1]), a[2].max(b[2])]);
@@ -67,8 +67,8 @@ pub fn snapshots(recording: &Recording, every: usize, of: &str) -> Result<Figure
     Ok(Figure::new(&format!("Snapshots: {of}"), [width, below + 4.0 + MARGIN], canvas))
 }
 
-/// As many control steps as take the robot about half its width on, a tenth of the longest phase at
-/// least.
+/// Returns the steps in which the robot moves half its width, at least a tenth of the longest
+/// phase.
 fn suitable(walk: &Walk) -> usize {
     let size = walk.extent(0..1);
     let half = 0.5 * (size.right - size.left).max(1.0);
@@ -77,12 +77,12 @@ fn suitable(walk: &Walk) -> usize {
     let longest = (0..phases.len()).map(|phase| walk.phase_frames(phase).len()).max().unwrap_or(1);
     let poses = (farthest / half).round().clamp(2.0, 6.0);
     let cycle = walk.recording().cycle.max(1);
-    // Whole cycles, so that all poses are of one phase of the muscles.
+    // Whole cycles, so that all poses have the same muscle phase.
     let steps = longest as f64 / poses;
     ((steps / cycle as f64).round() as usize).max(1) * cycle
 }
 
-/// Leftmost and rightmost x from the start of a phase, and the highest y.
+/// Returns the leftmost and rightmost x from the start of a phase, and the highest y.
 fn reach(walk: &Walk, phase: usize) -> [f64; 3] {
     let frames = walk.phase_frames(phase);
     let zero = walk.centre(frames.start)[0];
@@ -101,7 +101,7 @@ fn panel(canvas: &mut Canvas, walk: &Walk, phase: usize, every: usize, plot: &Pl
     let place = |[x, y]: [f64; 2]| plot.place([x - zero, y]);
     let last = frames.end - 1;
     let mut shown: Vec<usize> = frames.clone().step_by(every.max(1)).collect();
-    // The last pose is always there; one shortly before it would only blur it.
+    // Always draws the last pose; one shortly before it would only blur it.
     shown.retain(|frame| *frame == frames.start || last - frame >= every / 2);
     if !shown.contains(&last) {
         shown.push(last);
@@ -122,7 +122,7 @@ fn panel(canvas: &mut Canvas, walk: &Walk, phase: usize, every: usize, plot: &Pl
     for tick in plot.x.ticks() {
         let x = plot.place([tick, 0.0])[0];
         canvas.line([x, bottom], [x, bottom + 2.5], Pen::new(colour::GROUND_LINE, 0.6));
-        // Numbers that would reach beyond the panel are left out.
+        // Leaves out numbers that would extend beyond the panel.
         if (left + 4.0..left + plot.size[0] - 4.0).contains(&x) {
             canvas.text([x, bottom + 4.0 + 0.72 * TEXT], &plot.x.label(tick), Words::middle());
         }

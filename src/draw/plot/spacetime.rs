@@ -1,4 +1,4 @@
-//! The figure of a walk: the robot from above the time axis, one row per moment.
+//! The figure of a walk: the robot from above over time, one row per moment.
 
 use crate::draw::colour;
 use crate::draw::colour::Colour;
@@ -12,7 +12,7 @@ use crate::draw::walk::{Walk, area};
 use crate::task::recording::Recording;
 use std::ops::Range;
 
-/// Rows of a panel at most: finer ones would not be seen in print.
+/// Maximum number of rows in a panel: finer ones would be invisible in print.
 const ROWS: usize = 220;
 /// Cells across a panel.
 const CELLS: usize = 150;
@@ -26,12 +26,12 @@ const STIMULUS: f64 = 30.0;
 const PER_STEP: f64 = 0.2;
 const HEIGHTS: [f64; 2] = [90.0, 210.0];
 
-/// x over time, which runs downwards: every row is the robot as seen from above at that time,
-/// darker where its voxels are compressed. A panel per rollout, dashed lines where the stimulus
-/// changes. `of` says whose it is.
+/// Plots x over time, which runs downwards. Every row is the robot from above at that time, darker
+/// where its voxels are compressed. There is a panel per rollout, with dashed lines where the
+/// stimulus changes. `of` names the robot.
 ///
 /// # Errors
-/// [`PictureError::Recording`] if the recording cannot be drawn.
+/// Returns [`PictureError::Recording`] if the recording cannot be drawn.
 pub fn spacetime(recording: &Recording, of: &str) -> Result<Figure, PictureError> {
     let walk = Walk::new(recording)?;
     let mut rollouts = Vec::<Range<usize>>::new();
@@ -50,7 +50,7 @@ pub fn spacetime(recording: &Recording, of: &str) -> Result<Figure, PictureError
     let y = Axis::exact(0.0, longest as f64 / cycle, 5);
     let height = (PER_STEP * longest as f64).clamp(HEIGHTS[0], HEIGHTS[1]);
     let left = MARGIN + left_space(y.labels_width());
-    // One rollout has its stimuli beside it, several have them above.
+    // A single rollout has its stimuli beside it, several have them above.
     let (beside, above) = if rollouts.len() == 1 { (STIMULUS + 8.0, 4.0) } else { (0.0, STIMULUS + 6.0) };
     let gap = 8.0;
     let wide = (width - MARGIN - 4.0 - left - beside - gap * (columns - 1) as f64) / columns as f64;
@@ -67,7 +67,7 @@ pub fn spacetime(recording: &Recording, of: &str) -> Result<Figure, PictureError
     Ok(Figure::new(&format!("Position over time: {of}"), [width, bottom + MARGIN - 4.0], canvas))
 }
 
-/// An axis that holds all rollouts, each counted from its start.
+/// Returns an axis that holds all rollouts, each measured from its start.
 fn positions(walk: &Walk, rollouts: &[Range<usize>], columns: usize) -> Axis {
     let size = walk.recording().body.width() as f64 + 2.0;
     let reach = |rollout: &Range<usize>| {
@@ -81,12 +81,12 @@ fn positions(walk: &Walk, rollouts: &[Range<usize>], columns: usize) -> Axis {
     Axis::exact(low - 1.0, high + 1.0, if columns == 1 { 6 } else { 4 })
 }
 
-/// Where a moment of a rollout is in its panel, points from the top of the figure.
+/// Returns the y of a moment of a rollout, points from the top of the figure.
 fn moment(plot: &Plot, cycles: f64) -> f64 {
     plot.at[1] + plot.y.share(cycles) * plot.size[1]
 }
 
-/// Every how many frames a row is drawn.
+/// Returns the number of frames per row.
 fn every(rollout: &Range<usize>) -> usize {
     rollout.len().div_ceil(ROWS).max(1)
 }
@@ -113,7 +113,7 @@ fn rows(canvas: &mut Canvas, walk: &Walk, rollout: &Range<usize>, plot: &Plot, g
     canvas.clipped(plot.at, plot.size, |canvas| {
         for (gray, lines) in paths.into_iter().enumerate().filter(|(_, lines)| !lines.is_empty()) {
             let level = DARKEST + (LIGHTEST - DARKEST) * gray as f64 / (GRAYS - 1) as f64;
-            // A little higher than a row, so that no light shines through.
+            // Slightly higher than a row, so that no light shines through.
             canvas.path(lines, Pen::new(Colour::gray(level), high + 0.12));
         }
         let centres = rollout.clone().step_by(2).map(|frame| {
@@ -128,8 +128,7 @@ fn rows(canvas: &mut Canvas, walk: &Walk, rollout: &Range<usize>, plot: &Plot, g
     });
 }
 
-/// Areas of the darkest and the lightest gray: all but the extreme ones of the walk lie between
-/// them.
+/// Returns the areas of the darkest and lightest gray; only the walk's extremes lie beyond.
 fn grays(walk: &Walk, rollouts: &[Range<usize>], x: &Axis) -> [f64; 2] {
     let mut all = Vec::new();
     for rollout in rollouts {
@@ -141,7 +140,7 @@ fn grays(walk: &Walk, rollouts: &[Range<usize>], x: &Axis) -> [f64; 2] {
     all.sort_by(f64::total_cmp);
     let quantile = |share: f64| all.get((share * all.len() as f64) as usize).copied().unwrap_or(1.0);
     let (low, high) = (quantile(0.03), quantile(0.97));
-    // A body that hardly changes is not made to look as if it did.
+    // Keeps a body that hardly changes from looking as if it did.
     let least = (0.2 - (high - low)).max(0.0) / 2.0;
     [low - least, high + least]
 }
@@ -151,7 +150,7 @@ fn gray(area: f64, [small, large]: [f64; 2]) -> usize {
     (share * (GRAYS - 1) as f64).round() as usize
 }
 
-/// The mean area of the voxels in every cell across.
+/// Returns the mean area of the voxels over every cell across.
 fn areas(walk: &Walk, frame: usize, zero: f64, axis: &Axis) -> Vec<Option<f64>> {
     let mut sums = vec![(0.0, 0u32); CELLS];
     for (_, corners) in walk.voxels(frame) {

@@ -1,4 +1,4 @@
-//! [`Canvas`] → SVG elements, without ids, classes or styles.
+//! Renders a [`Canvas`] to SVG elements, without ids, classes or styles.
 
 use crate::base::number;
 use crate::draw::colour::Colour;
@@ -6,7 +6,7 @@ use crate::draw::plot::canvas::{Anchor, Canvas, Element, Ink, Pen, Piece, drawab
 use std::fmt;
 
 impl Canvas {
-    /// Its elements as SVG.
+    /// Returns the elements as SVG.
     pub fn svg(&self) -> String {
         self.elements().iter().map(|element| format!("{element}\n")).collect()
     }
@@ -54,7 +54,7 @@ impl fmt::Display for Element {
             }
             Element::Clipped { at, size, content } => {
                 let ([x, y], [width, height]) = (at.map(number), size.map(number));
-                // A nested svg clips without an id that a clip path would need.
+                // A nested svg clips without the id that a clip path would need.
                 write!(
                     out,
                     "<svg x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" viewBox=\"{x} {y} {width} {height}\" \
@@ -66,7 +66,7 @@ impl fmt::Display for Element {
     }
 }
 
-/// Path data.
+/// Writes path data.
 impl fmt::Display for Piece {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
         let through = |out: &mut fmt::Formatter, points: &[[f64; 2]]| {
@@ -92,14 +92,13 @@ impl fmt::Display for Piece {
     }
 }
 
-/// A number with two decimals at most; what is not finite or absurd becomes something that can be
-/// drawn.
+/// Formats a number with at most two decimals; NaN and extreme values become drawable ones.
 pub fn number(value: f64) -> String {
     let text = number::fixed(drawable(value), 2);
     text.trim_end_matches('0').trim_end_matches('.').to_string()
 }
 
-/// A text as it may stand in XML.
+/// Escapes a text for XML.
 pub fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for letter in text.chars() {

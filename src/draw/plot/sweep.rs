@@ -1,4 +1,4 @@
-//! The figure of a sweep: accuracy by what was varied, a dot per seed.
+//! The figure of a sweep: accuracy by the varied settings, a dot per seed.
 
 use crate::commands::collect::Row;
 use crate::draw::colour;
@@ -9,18 +9,18 @@ use crate::draw::{fonts, plot::scales};
 
 /// Height of a line, points.
 const LINE: f64 = 10.5;
-/// Room for what a line is about, points.
+/// Room for the label of a line, points.
 const MOST: f64 = 110.0;
 
-/// Runs that differ in the seed only.
+/// Runs that differ only in the seed.
 struct Line {
     about: String,
-    /// Accuracy and its interval, of each seed \[%\].
+    /// Accuracy of each seed and its interval \[%\].
     dots: Vec<(f64, Option<[f64; 2]>)>,
 }
 
-/// Accuracy on held-out images by what was varied, a dot per seed with its 95 % interval, and the
-/// mean of several seeds; none if nothing was tested. Different tasks have lines of their own.
+/// Plots accuracy on held-out images by the varied settings: a dot per seed with its 95 % interval,
+/// the mean of several seeds, a line per task. Returns `None` if no run was tested.
 pub fn sweep(name: &str, rows: &[Row]) -> Option<Figure> {
     let mut lines: Vec<Line> = Vec::new();
     let mut images = None;
@@ -78,7 +78,7 @@ pub fn sweep(name: &str, rows: &[Row]) -> Option<Figure> {
     Some(Figure::new(&format!("Accuracy: {name}"), [COLUMN, height], canvas))
 }
 
-/// What a run is about, without its seed.
+/// Describes a run without its seed.
 fn about(row: &Row, recognises: &str) -> String {
     let word = |(key, value): &(String, String)| match key.as_str() {
         "seed" | "groups" => None,

@@ -18,10 +18,10 @@ const GAP: f64 = 4.0;
 /// Largest side of a body, points.
 const LARGEST: f64 = 110.0;
 
-/// Space for what stands below a body, points.
+/// Space for the caption below a body, points.
 const CAPTION: f64 = 17.0;
 
-/// Images by their class and by the team's answer, most votes; none while there are no answers.
+/// Plots images by class and by the team's answer, most votes; returns `None` without answers.
 pub fn confusion(file: &TeamFile) -> Option<Figure> {
     let votes = &file.answers.as_ref()?.votes;
     let count = file.classes.len();
@@ -39,7 +39,7 @@ pub fn confusion(file: &TeamFile) -> Option<Figure> {
     let names = widest(&mut file.classes.iter().map(u8::to_string));
     let numbers = widest(&mut votes.confusion.iter().flatten().map(usize::to_string));
     let left = MARGIN + (3.0 * TEXT).max(TEXT + names + 8.0);
-    // Of many classes the figure is as wide as names and numbers need, up to a page.
+    // With many classes the figure is as wide as names and numbers need, up to a page.
     let within = |width: f64| (width - MARGIN - left) / count as f64;
     let side = (names.max(numbers) + 3.0).min(within(PAGE)).max(within(COLUMN));
     let width = left + side * count as f64 + MARGIN;
@@ -80,16 +80,16 @@ pub fn confusion(file: &TeamFile) -> Option<Figure> {
     Some(Figure::new(&format!("Answers: {of}"), [width, height], canvas))
 }
 
-/// All bodies, with what each tells apart and how well: where every task is a pair of classes, as a
-/// triangle with the lower class from top to bottom and the higher from left to right. None without
-/// robots.
+/// Plots all bodies, with the classes that each tells apart and its accuracy. If every task is a
+/// pair of classes, they form a triangle, with the lower class from top to bottom and the higher
+/// from left to right. Returns `None` without robots.
 pub fn poster(file: &TeamFile) -> Option<Figure> {
     if file.members.is_empty() {
         return None;
     }
     let captions = file.members.iter().map(|member| fonts::width(&ways(member, f64::INFINITY), TEXT, false));
     let widest = captions.fold(1.0, f64::max).min(LARGEST);
-    // Columns that leave room for what stands below a body.
+    // Columns wide enough for the caption below a body.
     let most = ((PAGE - 2.0 * MARGIN) / widest) as usize;
     let of_pairs = triangle(file).filter(|_| file.classes.len() - 1 <= most);
     let places = of_pairs.unwrap_or_else(|| rows(file.members.len(), most));
@@ -124,7 +124,7 @@ pub fn poster(file: &TeamFile) -> Option<Figure> {
     Some(Figure::new(&format!("Team: {of}"), [PAGE, bottom.max(below) + MARGIN], canvas))
 }
 
-/// Column and line of each robot, if every task is a pair of classes and every pair has one robot.
+/// Returns the places of the robots if every task is a pair of classes and every pair has a robot.
 fn triangle(file: &TeamFile) -> Option<Vec<[usize; 2]>> {
     let place = |class: u8| file.classes.iter().position(|other| *other == class);
     let of = |member: &Member| match &member.groups {
@@ -142,8 +142,8 @@ fn triangle(file: &TeamFile) -> Option<Vec<[usize; 2]>> {
     (different.len() == places.len() && places.len() == pairs && pairs > 1).then_some(places)
 }
 
-/// Column and line of each of so many, about as many lines as columns, of which there are some at
-/// most.
+/// Returns column and line of `count` bodies, about as many lines as columns, at most `most`
+/// columns.
 fn rows(count: usize, most: usize) -> Vec<[usize; 2]> {
     let columns = ((count as f64).sqrt().ceil().max(4.0) as usize).min(most);
     (0..count).map(|number| [number % columns, number / columns]).collect()
@@ -163,7 +163,7 @@ fn drawn(canvas: &mut Canvas, at: [f64; 2], side: f64, body: &Body) {
     robot::body_outline(canvas, at, cell, body, Pen::new(colour::INK, 0.4));
 }
 
-/// What a robot tells apart by walking left or right, and how well.
+/// Writes the classes that a robot tells apart by walking left or right, and its accuracy.
 fn caption(canvas: &mut Canvas, [middle, y]: [f64; 2], most: f64, member: &Member) {
     canvas.text([middle, y + 7.5], &ways(member, most + GAP), Words::middle());
     let accuracy = format!("{} %", percent(member.own.accuracy));
@@ -175,8 +175,8 @@ fn caption(canvas: &mut Canvas, [middle, y]: [f64; 2], most: f64, member: &Membe
     );
 }
 
-/// The classes under which it walks left, a bar, those under which it walks right; of many, as many as
-/// fit.
+/// Returns the classes under which the robot walks left, a bar, and those under which it walks
+/// right, as many as fit.
 fn ways(member: &Member, most: f64) -> String {
     let (a, b) = if member.first_group_walks == Direction::Left.name() { (0, 1) } else { (1, 0) };
     let groups = [a, b].map(|k| {
@@ -186,7 +186,7 @@ fn ways(member: &Member, most: f64) -> String {
     let with = |[left, right]: [&str; 2]| format!("← {left} | {right} →");
     let room = most - fonts::width(&with(["", ""]), TEXT, false);
     let [left, right] = [&groups[0], &groups[1]].map(|group| fonts::width(group, TEXT, false));
-    // One that needs less than its half leaves the rest to the other.
+    // A side that needs less than half leaves the rest to the other.
     let fitted =
         |k: usize, other: f64| fonts::fitted(&groups[k], TEXT, false, (room / 2.0).max(room - other));
     with([&fitted(0, right), &fitted(1, left)])
@@ -219,7 +219,7 @@ mod tests {
         assert!(said(&member).contains(">← 1 2 3 | 0 →<"), "{}", said(&member));
         member.first_group_walks = "left".into();
         assert!(said(&member).contains(">← 0 | 1 2 3 →<"), "{}", said(&member));
-        // Of many classes on one side, the few on the other are still there.
+        // With many classes on one side, the few on the other are still there.
         member.groups = [(1..26).collect(), vec![26]];
         let text = ways(&member, 80.0);
         assert!(text.starts_with("← 1 2 3") && text.ends_with("… | 26 →"), "{text}");

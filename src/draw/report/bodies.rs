@@ -1,4 +1,4 @@
-//! Robots as buttons: a click plays them.
+//! Robots as buttons; a click plays them.
 
 use crate::base::number;
 use crate::base::remedy::Invocation;
@@ -14,11 +14,11 @@ use crate::store::run::Robot;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-/// Robots shown of each kind.
+/// Robots of each kind in the page.
 const SHOWN: usize = 5;
 
-/// A button that plays a robot. `look`: its style, what stands before the robot's figures for those
-/// who cannot see it, and whether it is played at first.
+/// Returns a button that plays a robot. The tuple holds its style, a name before the robot's
+/// figures for screen readers, and whether it plays first.
 pub(super) fn button(
     run: usize,
     (dossier, spell): (&Dossier, Spell),
@@ -45,7 +45,7 @@ pub(super) fn button(
     )
 }
 
-/// A robot in a line.
+/// Describes a robot in a line.
 fn about(dossier: &Dossier, robot: &Robot) -> String {
     let counts = robot.voxels;
     let verdict = dossier.findings.audit.as_ref().and_then(|audit| audit.robot(&robot.id));
@@ -65,19 +65,19 @@ fn about(dossier: &Dossier, robot: &Robot) -> String {
     )
 }
 
-/// The fittest robots, and the most different ones.
+/// Returns buttons for the fittest robots and the most different ones.
 pub(super) fn bodies(run: usize, dossier: &Dossier, rollouts: &Rollouts, spell: Spell) -> String {
     let mut fittest: Vec<&Robot> = dossier.run.elites.iter().collect();
     fittest.sort_by(|a, b| b.objective.total_cmp(&a.objective));
     let mut seen = BTreeSet::new();
-    // A training has one robot, and no map from which it would be played.
+    // A training has one robot, and no map that would play it.
     let is_first = dossier.run.origin.is_some();
     let chosen = fittest.into_iter().take(SHOWN).chain(dossier.most_different(SHOWN + 1));
     let buttons: String = chosen
         .filter(|robot| seen.insert(robot.id.clone()))
         .map(|robot| {
             let id = escape(&robot.id);
-            // Walks of a training are from raised starts and so on: other ones than those that are played.
+            // The walks of a training had raised starts and so on; the page plays others.
             let walks: Vec<String> = match dossier.run.follows_protocol() {
                 true => robot.displacements.iter().take(4).map(|d| number::signed(*d, 1)).collect(),
                 false => vec![format!("fitness {}", number::fixed(robot.objective, 2))],
@@ -94,7 +94,7 @@ pub(super) fn bodies(run: usize, dossier: &Dossier, rollouts: &Rollouts, spell: 
     format!("<div class=\"bodies\">{buttons}</div>\n")
 }
 
-/// A body's voxels by material.
+/// Draws a body's voxels by material.
 fn picture(body: &Body) -> String {
     let (height, width) = (body.voxels().height(), body.voxels().width());
     let mut out =
@@ -102,7 +102,7 @@ fn picture(body: &Body) -> String {
     for material in Material::ALL.into_iter().filter(|material| *material != Material::Empty) {
         let mut path = String::new();
         for ((row, column), _) in body.voxels().iter().filter(|(_, found)| **found == material) {
-            // Text is written to memory, which takes it all.
+            // Writing text to memory cannot fail.
             let _ = write!(path, "M{column} {row}h1v1h-1z");
         }
         if !path.is_empty() {
@@ -113,7 +113,7 @@ fn picture(body: &Body) -> String {
     out + "</svg>"
 }
 
-/// The marks on a body's voxels of a material, as one path.
+/// Returns the marks on a body's voxels of a material, as one path.
 fn marks(body: &Body, material: Material) -> String {
     let mut data = String::new();
     for ((row, column), _) in body.voxels().iter().filter(|(_, found)| **found == material) {

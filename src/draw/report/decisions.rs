@@ -1,16 +1,16 @@
-//! What a team answered, as a table and in remarks: for the page and the terminal.
+//! The answers of a team, as a table and in remarks, for the page and the terminal.
 
 use crate::analysis::votes::Accuracy;
 use crate::base::number;
 use crate::base::number::percent;
 use crate::store::team::{Decoded, TeamFile};
 
-/// What others did with the ten digits of MNIST in mechanics.
+/// Published results on the ten digits of MNIST in mechanics.
 const LITERATURE: &str = "mechanics elsewhere: an oscillating plate with trained weights around it, 87 % of \
                           MNIST's test images (Wright et al. 2022, Nature 601, 549)";
 
-/// What the team answers, and what answers the same images without bodies: headers and rows; none
-/// while there are no answers.
+/// Returns headers and rows of the team's answers and of baselines without bodies on the same
+/// images, or `None` without answers.
 pub(crate) fn table(file: &TeamFile) -> Option<(Vec<String>, Vec<Vec<String>>)> {
     let (Some(answers), Some(baselines)) = (&file.answers, &file.baselines) else { return None };
     let row = |name: &str, accuracy: &Accuracy| {
@@ -32,7 +32,7 @@ pub(crate) fn table(file: &TeamFile) -> Option<(Vec<String>, Vec<Vec<String>>)> 
     Some((headers, rows.map(|(row, classes)| [row, classes].concat()).to_vec()))
 }
 
-/// What is to be said of these answers, in lines.
+/// Returns remarks on these answers, in lines.
 pub(crate) fn remarks(file: &TeamFile) -> Vec<String> {
     let (Some(answers), Some(baselines)) = (&file.answers, &file.baselines) else { return Vec::new() };
     let (images, robots) = (file.images.len(), file.members.len());
@@ -56,7 +56,7 @@ pub(crate) fn remarks(file: &TeamFile) -> Vec<String> {
     lines
 }
 
-/// Accuracy and interval \[%\].
+/// Formats accuracy and interval \[%\].
 pub(crate) fn figures(accuracy: &Accuracy) -> [String; 2] {
     let [low, high] = accuracy.interval;
     [percent(accuracy.accuracy), format!("{}–{}", percent(low), percent(high))]

@@ -1,4 +1,4 @@
-//! The archive as buttons, and the rollouts they play.
+//! The archive as buttons, and the rollouts that they play.
 
 use crate::base::threads::in_pool;
 use crate::commands::report::{Dossier, Gathered};
@@ -13,20 +13,19 @@ use crate::store::run::Robot;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Bytes of all rollouts of a page together, before they are packed: packed, as text, they are
-/// about as many.
+/// Bytes of all rollouts of a page before packing; packed and as text they take about as many.
 const MOST_BYTES: usize = 13_000_000;
-/// Most bytes of a single one.
+/// Maximum size of a single rollout, bytes.
 const MOST_OF_ONE: usize = 1_500_000;
 
-/// Where the chosen robot walks.
+/// The element in which the chosen robot walks.
 const PLAYER: &str = "<div>\n<p class=\"about\" aria-live=\"polite\"></p>\n<iframe title=\"The chosen \
      robot\"></iframe>\n</div>\n";
 
-/// Rollouts, packed, by run and robot.
+/// Packed rollouts by run and robot.
 pub(super) struct Rollouts(BTreeMap<(usize, String), String>);
 
-/// The robots of a run that can be played: the fittest.
+/// Returns the robots of a run that can be played: the fittest.
 pub(super) fn played(dossier: &Dossier, most: usize) -> Vec<&Robot> {
     if dossier.images.is_empty() {
         return Vec::new();
@@ -38,7 +37,7 @@ pub(super) fn played(dossier: &Dossier, most: usize) -> Vec<&Robot> {
 }
 
 impl Rollouts {
-    /// Simulates them.
+    /// Simulates and packs the rollouts.
     pub fn record(
         gathered: &Gathered,
         most: usize,
@@ -64,12 +63,12 @@ impl Rollouts {
         in_pool(|| jobs.par_iter().map(one).collect::<Result<BTreeMap<_, _>, _>>())?.map(Rollouts)
     }
 
-    /// Id of the element with a robot's rollout.
+    /// Returns the id of the element with a robot's rollout.
     pub fn id(&self, run: usize, robot: &str) -> Option<String> {
         self.0.contains_key(&(run, robot.to_string())).then(|| format!("rollout-{run}-{robot}"))
     }
 
-    /// The elements that hold them.
+    /// Returns the elements that hold the rollouts.
     pub fn elements(&self) -> String {
         let element = |((run, robot), rollout): (&(usize, String), &String)| {
             format!("<script type=\"text/plain\" id=\"rollout-{run}-{}\">{rollout}</script>\n", escape(robot))
@@ -78,14 +77,14 @@ impl Rollouts {
     }
 }
 
-/// Counts in a bin, in words.
+/// Describes the counts in a bin.
 fn range(bin: usize, area: usize) -> String {
     let width = (area / COUNT_BINS).max(1);
     let last = if bin + 1 == COUNT_BINS { area } else { ((bin + 1) * width - 1).min(area) };
     format!("{}–{last}", bin * width)
 }
 
-/// The map with its player.
+/// Returns the map with its player.
 pub(super) fn archive(number: usize, dossier: &Dossier, rollouts: &Rollouts, spell: Spell) -> String {
     let run = &dossier.run;
     let tasks = &run.dimensions.tasks;
@@ -131,7 +130,7 @@ pub(super) fn archive(number: usize, dossier: &Dossier, rollouts: &Rollouts, spe
         );
         for total in 0..COUNT_BINS {
             let mut cells = String::new();
-            // Rows in which no body can be are left out.
+            // Leaves out rows in which no body is possible.
             let highest = possible.iter().filter(|cell| cell[2] == total).map(|cell| cell[1]).max();
             let Some(highest) = highest else { continue };
             for sensor in (0..=highest).rev() {
@@ -167,7 +166,7 @@ pub(super) fn archive(number: usize, dossier: &Dossier, rollouts: &Rollouts, spe
     out + "</div>\n" + PLAYER + "</div>\n"
 }
 
-/// The robots of a training with their player.
+/// Returns the robots of a training with their player.
 pub(super) fn robots(number: usize, dossier: &Dossier, rollouts: &Rollouts, spell: Spell) -> String {
     format!("<div class=\"archive\">\n{}{PLAYER}</div>\n", bodies(number, dossier, rollouts, spell))
 }

@@ -1,5 +1,5 @@
-//! One self-contained page about runs: what was run, how it came along, an archive whose robots can
-//! be played, and what tests found of them. No network, works from `file://`.
+//! One self-contained page about runs: their settings and progress, an archive whose robots can be
+//! played, and test results. It needs no network and works from `file://`.
 
 mod bodies;
 pub(crate) mod decisions;
@@ -23,29 +23,29 @@ const SCRIPT: &str =
 /// Spells a command as its users type it.
 pub type Spell<'a> = &'a dyn Fn(&Invocation) -> String;
 
-/// What goes into a page.
+/// The content of a page.
 #[derive(Clone, Copy)]
 pub struct Content<'a> {
-    /// What is known.
+    /// The runs and the findings about them.
     pub gathered: &'a Gathered,
-    /// Most robots of each run that can be played; the fittest of them.
+    /// Maximum number of robots of each run that can be played, the fittest first.
     pub rollouts: usize,
-    /// Spells the commands that make it all again.
+    /// Spells the commands that reproduce the results.
     pub spell: Spell<'a>,
 }
 
 impl Content<'_> {
-    /// Rollouts that have to be simulated for it.
+    /// Returns the number of rollouts to simulate for the page.
     pub fn count(&self) -> usize {
         let of_runs: usize =
             self.gathered.runs.iter().map(|dossier| maps::played(dossier, self.rollouts).len()).sum();
         of_runs + self.gathered.team.as_ref().map_or(0, team::count)
     }
 
-    /// The page as text; `simulated` gets the number of rollouts simulated so far.
+    /// Returns the page as text; `simulated` receives the number of rollouts simulated so far.
     ///
     /// # Errors
-    /// If a rollout cannot be drawn.
+    /// Returns an error if a rollout cannot be drawn.
     pub fn page(&self, simulated: &(dyn Fn(u64) + Sync)) -> Result<String, PictureError> {
         let Gathered { runs, together, team } = self.gathered;
         let done = AtomicU64::new(0);
@@ -79,12 +79,12 @@ impl Content<'_> {
     }
 }
 
-/// A figure in the page, in a column's or a page's width.
+/// Embeds a figure in the page, in a column's or a page's width.
 fn figure(figure: &Figure, class: &str) -> String {
     format!("<figure class=\"figure {class}\">{}</figure>\n", figure.svg())
 }
 
-/// What several runs have in common.
+/// Summarises several runs together.
 fn overview(runs: &[Dossier], together: &Findings) -> String {
     let mut out = "<section id=\"together\">\n<h2>All runs together</h2>\n".to_string();
     let are_trained = runs.iter().all(|dossier| dossier.run.origin.is_some());
@@ -97,7 +97,6 @@ fn overview(runs: &[Dossier], together: &Findings) -> String {
     out + "</section>\n"
 }
 
-/// A run.
 fn run(
     number: usize,
     dossier: &Dossier,
@@ -110,7 +109,7 @@ fn run(
     let mut out = format!("<section id=\"run{number}\" data-run=\"{number}\">\n{}", heading("What was run"));
     out += &tables::about(dossier);
     if dossier.run.origin.is_some() {
-        // It has one robot, and no archive that came along.
+        // A training has one robot, and no archive with a history.
         out += &heading("The robot");
         out += &maps::robots(number, dossier, rollouts, spell);
     } else {
@@ -136,7 +135,7 @@ fn run(
     out + "</section>\n"
 }
 
-/// What tests found.
+/// Summarises the test results.
 fn findings(found: &Findings) -> String {
     let mut out = String::new();
     if let Some(report) = found.eval.as_ref().filter(|report| !report.robots.is_empty()) {

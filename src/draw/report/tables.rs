@@ -15,10 +15,10 @@ use crate::store::capacity::CapacityFile;
 use crate::store::eval::{EvalFile, Mean, RobotReport};
 use crate::store::images::HeldOut;
 
-/// Robots of a test or an audit that are listed one by one.
+/// Maximum number of robots that a test or an audit lists one by one.
 const LISTED: usize = 50;
 
-/// A table; the first column is words, all others are numbers.
+/// Returns a table; the first column holds words, all others numbers.
 pub(super) fn table(headers: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let class = |place: usize| if place == 0 { "" } else { " class=\"number\"" };
     let head: String = headers
@@ -44,7 +44,7 @@ fn or_none<T>(value: Option<T>, text: impl Fn(T) -> String) -> String {
     value.map_or("–".to_string(), text)
 }
 
-/// A line per run.
+/// Returns a table with a row per run.
 pub(super) fn runs(runs: &[Dossier]) -> String {
     let row = |dossier: &Dossier| {
         let stats = dossier.run.stats;
@@ -61,7 +61,7 @@ pub(super) fn runs(runs: &[Dossier]) -> String {
     table(&headers, runs.iter().map(row))
 }
 
-/// A line per training.
+/// Returns a table with a row per training.
 pub(super) fn trainings(runs: &[Dossier]) -> String {
     let row = |dossier: &Dossier| {
         let run = &dossier.run;
@@ -85,7 +85,7 @@ pub(super) fn trainings(runs: &[Dossier]) -> String {
     table(&headers, runs.iter().map(row))
 }
 
-/// What was run: words and values.
+/// Describes a run as keys and values.
 pub(super) fn about(dossier: &Dossier) -> String {
     let run = &dossier.run;
     let stats = run.stats;
@@ -151,7 +151,7 @@ pub(super) fn about(dossier: &Dossier) -> String {
     )
 }
 
-/// Accuracies by task and by robot.
+/// Lists accuracies by task and by robot.
 pub(super) fn eval(report: &EvalFile) -> String {
     let mut out = format!(
         "<p>{} {} {} images; {}; a displacement up to {} voxel lengths counts as wrong.</p>\n",
@@ -214,13 +214,12 @@ pub(super) fn eval(report: &EvalFile) -> String {
     out
 }
 
-/// How many more there are than are listed, and where.
+/// Notes how many entries are not listed, and which file has them.
 fn more(count: usize, file: &str) -> String {
     let more = count.saturating_sub(LISTED);
     if more > 0 { format!("<p>And {more} more, in <code>{file}</code>.</p>\n") } else { String::new() }
 }
 
-/// Verdicts.
 pub(super) fn audit(audit: &AuditFile) -> String {
     let verdicts = [Verdict::Physical, Verdict::Exploits, Verdict::Fragile, Verdict::NotAWalker];
     let counts: Vec<String> = verdicts
@@ -254,7 +253,6 @@ pub(super) fn audit(audit: &AuditFile) -> String {
     out
 }
 
-/// Capacities.
 pub(super) fn capacity(file: &CapacityFile) -> String {
     let rows = file.tasks.iter().map(|task| {
         let own = |network: &str| or_none(task.size_of(network), size);
@@ -286,13 +284,13 @@ pub(super) fn capacity(file: &CapacityFile) -> String {
     )
 }
 
-/// A capacity in a table.
+/// Formats a capacity for a table.
 pub(crate) fn size(capacity: Option<Crossing>) -> String {
     capacity.map_or_else(|| "no match".to_string(), |size| size.to_string())
 }
 
-/// What tables of evaluated robots begin with: robot, task, fitness, accuracy, its interval,
-/// balanced accuracy.
+/// Returns the first cells of a row about an evaluated robot: robot, task, fitness, accuracy, its
+/// interval, balanced accuracy.
 pub(crate) fn of_robot(robot: &RobotReport) -> Vec<String> {
     let [low, high] = robot.interval.map(percent);
     vec![

@@ -1,5 +1,4 @@
-//! The team of a report: what it answers, and a few images to watch it by, every robot on a small
-//! stage.
+//! The team of a report: its answers, and a few images under which all robots walk on small stages.
 
 use crate::analysis::votes::Tally;
 use crate::base::Grid;
@@ -21,21 +20,21 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::fmt::Write;
 
-/// Steps of a position per voxel length: a body on a small stage has some four pixels to a voxel.
+/// Steps of a position per voxel length: on a small stage a voxel has some four pixels.
 const STEPS: f64 = 32.0;
 
-/// Bytes of all walks of the team together, before they are packed.
+/// Bytes of all walks of the team before packing.
 const MOST_BYTES: usize = 9_000_000;
 
-/// Control steps from one moment to the next, at least: ten moments of a cycle.
+/// Minimum control steps from one moment to the next: ten moments a cycle.
 const LEAST_APART: usize = 5;
 
-/// Rollouts that have to be simulated.
+/// Returns the number of rollouts to simulate.
 pub(super) fn count(team: &Team) -> usize {
     team.images.len() * team.file.members.len()
 }
 
-/// What the team answers; with buttons and stages if there are images to watch it by.
+/// Returns the team's answers, with buttons and stages if there are images to watch it by.
 pub(super) fn section(
     team: &Team,
     runs: &[Dossier],
@@ -65,7 +64,7 @@ pub(super) fn section(
     Ok(out + "</section>\n")
 }
 
-/// Buttons, the stages, and the walks.
+/// Returns the buttons, the stages and the walks.
 fn watched(team: &Team, runs: &[Dossier], simulated: &(dyn Fn() + Sync)) -> Result<String, PictureError> {
     let shown = shown(team, runs);
     let members = team.file.members.len();
@@ -77,7 +76,7 @@ fn watched(team: &Team, runs: &[Dossier], simulated: &(dyn Fn() + Sync)) -> Resu
         walk
     };
     let walks: Vec<PackedWalk> = in_pool(|| jobs.par_iter().map(walk).collect())?;
-    // In a script element only "<" could end it or open another.
+    // In a script element, only "<" can end it or open another.
     let robots = robots(team, &walks, &shown).to_string().replace('<', "\\u003c");
     let mut elements = format!("<script type=\"application/json\" id=\"team-robots\">{robots}</script>\n");
     let mut buttons = String::new();
@@ -100,7 +99,7 @@ fn watched(team: &Team, runs: &[Dossier], simulated: &(dyn Fn() + Sync)) -> Resu
     ))
 }
 
-/// The moments that are shown, in control steps, the first and the last among them.
+/// Returns the moments to show, in control steps, including the first and the last.
 fn shown(team: &Team, runs: &[Dossier]) -> Vec<usize> {
     let Team { file, runs: of, .. } = team;
     let points = |member: &Member| (member.body.height() + 1) * (member.body.width() + 1);
@@ -112,8 +111,8 @@ fn shown(team: &Team, runs: &[Dossier]) -> Vec<usize> {
     (0..steps).step_by(apart).chain([steps]).collect()
 }
 
-/// The robots and what else the page's script has to know of all walks. The first walks are under
-/// the first image, one of each robot.
+/// Returns the robots and the data for the page's script that all walks share. The first walks are
+/// those under the first image, one per robot.
 fn robots(team: &Team, walks: &[PackedWalk], shown: &[usize]) -> Value {
     let file = &team.file;
     let robot = |(member, walk): (&Member, &PackedWalk)| {
@@ -128,7 +127,7 @@ fn robots(team: &Team, walks: &[PackedWalk], shown: &[usize]) -> Value {
     })
 }
 
-/// All walks under an image, and what they come to at every moment.
+/// Returns all walks under an image, and the tally at every moment.
 fn under_image(team: &Team, number: usize, walks: &[PackedWalk]) -> Value {
     let file = &team.file;
     let judges: Vec<Judge> = file.members.iter().map(Member::judge).collect();
@@ -144,13 +143,13 @@ fn under_image(team: &Team, number: usize, walks: &[PackedWalk]) -> Value {
     })
 }
 
-/// What the team answered to one of the images to watch it by.
+/// Returns the team's answer to one of the images to watch it by.
 fn answer(team: &Team, number: usize) -> u8 {
     let answers = team.file.answers.as_ref().expect("a team that has not answered is left out");
     answers.votes.answers[team.images[number]]
 }
 
-/// A button that shows the walks under an image.
+/// Returns a button that plays the walks under an image.
 fn button(team: &Team, number: usize) -> String {
     let image = team.file.images[team.images[number]];
     let answer = answer(team, number);
@@ -167,11 +166,11 @@ fn button(team: &Team, number: usize) -> String {
 struct PackedWalk {
     voxels: Vec<VoxelCorners>,
     points: usize,
-    /// Where its centre of mass is at first \[voxel lengths\].
+    /// The centre of mass at first, x \[voxel lengths\].
     begin: f64,
-    /// How far it has walked \[voxel lengths\]; none of an unstable one.
+    /// The distance walked \[voxel lengths\]; `None` for moments that are missing or unstable.
     moved: Vec<Option<f64>>,
-    /// Its points, packed as [`positions`] says, in base64.
+    /// The points, packed by [`positions`], in base64.
     positions: String,
 }
 
@@ -196,9 +195,9 @@ fn is_finite(frame: &Frame) -> bool {
     frame.points.iter().flatten().all(|v| v.is_finite())
 }
 
-/// Points in steps of 1/32 voxel length: of the first moment 16-bit numbers, little-endian; of each
-/// next one, 8-bit differences to the moment before as it was packed. What moves faster than four
-/// voxel lengths from one moment to the next lags behind.
+/// Packs points in steps of 1/32 voxel length. The first moment has 16-bit numbers, little-endian;
+/// each next one has 8-bit differences from the packed previous moment. Points that move faster
+/// than four voxel lengths per moment lag behind.
 fn positions(frames: &[&Frame]) -> Vec<u8> {
     let steps = |frame: &Frame| -> Vec<i32> {
         frame.points.iter().flatten().map(|v| (v * STEPS).round() as i32).collect()
@@ -217,7 +216,7 @@ fn positions(frames: &[&Frame]) -> Vec<u8> {
     bytes
 }
 
-/// What sensors see, as a picture.
+/// Draws the stimulus that the sensors measure.
 fn thumbnail(stimulus: &Grid<f64>) -> String {
     let (height, width) = (stimulus.height(), stimulus.width());
     let mut out = format!(
@@ -227,7 +226,7 @@ fn thumbnail(stimulus: &Grid<f64>) -> String {
     for ((row, column), value) in stimulus.iter() {
         let grey = (255.0 * value.clamp(0.0, 1.0)).round() as u8;
         if grey > 0 {
-            // Text is written to memory, which takes it all.
+            // Writing text to memory cannot fail.
             let _ =
                 write!(out, "<path fill=\"#{grey:02x}{grey:02x}{grey:02x}\" d=\"M{column} {row}h1v1h-1z\"/>");
         }

@@ -1,4 +1,4 @@
-//! The words of a report: its title, a methods paragraph, and the commands that make it again.
+//! The words of a report: its title, a methods paragraph, and the commands that reproduce it.
 
 use crate::base::hash::short;
 use crate::base::number;
@@ -29,14 +29,13 @@ use crate::task::stimulus::Encoding;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// A run in short, with its folder if another one is called the same.
+/// Names a run, with its folder if another run has the same name.
 pub(super) fn name(dossier: &Dossier) -> String {
     let folder = dossier.path.parent().filter(|_| dossier.namesake.is_some());
     let folder = folder.map_or(String::new(), |folder| format!(" ({})", folder.display()));
     format!("{}, seed {}{folder}", dossier.run.name, dossier.run.config.seed)
 }
 
-/// The page's title.
 pub(super) fn title(runs: &[Dossier]) -> String {
     match runs {
         [one] => format!("{} – morphcog", name(one)),
@@ -44,7 +43,7 @@ pub(super) fn title(runs: &[Dossier]) -> String {
     }
 }
 
-/// Links to the runs, if there are several.
+/// Returns links to the runs, if there are several.
 pub(super) fn contents(runs: &[Dossier]) -> String {
     if runs.len() < 2 {
         return String::new();
@@ -55,7 +54,7 @@ pub(super) fn contents(runs: &[Dossier]) -> String {
     format!("<nav aria-label=\"Runs\">\n{}</nav>\n", runs.iter().enumerate().map(link).collect::<String>())
 }
 
-/// What fitness rewards.
+/// Describes what fitness rewards.
 fn rewarded(fitness: Fitness) -> &'static str {
     match fitness {
         Fitness::Min => {
@@ -73,7 +72,7 @@ fn rewarded(fitness: Fitness) -> &'static str {
     }
 }
 
-/// How the robots came about by evolution.
+/// Describes how the robots evolved.
 fn evolved(dossier: &Dossier) -> String {
     let run = &dossier.run;
     let evaluations = dossier
@@ -94,7 +93,7 @@ fn evolved(dossier: &Dossier) -> String {
     )
 }
 
-/// How the robot was trained.
+/// Describes how the robot was trained.
 fn trained(run: &RunFile, origin: &Origin) -> String {
     let TrainConfig { random_images, rounds, images, final_images, challengers, .. } = run.config.train;
     let window = match origin.windows {
@@ -116,7 +115,7 @@ fn trained(run: &RunFile, origin: &Origin) -> String {
     )
 }
 
-/// Under what else the images of a training were shown, by turns.
+/// Describes the perturbations that alternate in a training.
 fn perturbed(run: &RunFile) -> String {
     let ByTurns { start, length_limits } = run.config.train.perturbations;
     let start = (start > 0).then(|| format!("from starts raised by up to {start} voxels"));
@@ -125,7 +124,7 @@ fn perturbed(run: &RunFile) -> String {
     if both.is_empty() { String::new() } else { format!(" ({})", both.join(", ")) }
 }
 
-/// A paragraph that could go into a paper.
+/// Returns a methods paragraph that could go into a paper.
 pub(super) fn methods(dossier: &Dossier) -> String {
     let run = &dossier.run;
     let config = &run.config;
@@ -196,8 +195,8 @@ pub(super) fn methods(dossier: &Dossier) -> String {
     format!("<p>{}</p>\n", escape(&text))
 }
 
-/// The commands that make a run and its tests again; audits with other criteria, and networks
-/// trained with other hyperparameters, need these besides.
+/// Returns the commands that reproduce a run and its tests. They omit other criteria of audits and
+/// other hyperparameters of networks.
 pub(super) fn commands(dossier: &Dossier, spell: Spell) -> String {
     let number = dossier.namesake.map_or(String::new(), |before| format!("-{}", before + 1));
     let again = PathBuf::from(format!("again/{}-seed{}{number}", dossier.run.name, dossier.run.config.seed));
@@ -236,8 +235,8 @@ pub(super) fn commands(dossier: &Dossier, spell: Spell) -> String {
     format!("<pre>{}</pre>\n", escape(&lines.join("\n")))
 }
 
-/// What was asked for of images that were shown: they tell it, unless all that there are happen to
-/// be evenly divided, and then both are the same.
+/// Infers the requested number of images from those measured. If all available images happen to be
+/// evenly divided, both answers mean the same.
 fn how_many(images: &[ImageRef]) -> HowMany {
     let mut counts = BTreeMap::<u8, usize>::new();
     images.iter().for_each(|image| *counts.entry(image.label).or_default() += 1);
@@ -247,7 +246,7 @@ fn how_many(images: &[ImageRef]) -> HowMany {
     }
 }
 
-/// The command that makes the run again, after what is to be known for it.
+/// Returns the command that reproduces the run, after the facts that it needs.
 fn made_by(dossier: &Dossier, again: &Path, spell: Spell) -> Vec<String> {
     let (run, config) = (&dossier.run, dossier.path.with_file_name(CONFIG));
     let Some(origin) = &run.origin else {
@@ -275,7 +274,7 @@ fn made_by(dossier: &Dossier, again: &Path, spell: Spell) -> Vec<String> {
     if let Some(robot) = robot {
         train = train.option("robots", robot);
     }
-    // The gaits' run may have any of these otherwise.
+    // The gaits' run may have other values of these.
     train = train.option("set", format!("data.dataset={}", run.config.data.dataset));
     for (key, value) in seeing_and_training(&run.config) {
         let value = value.as_str().map_or_else(|| value.to_string(), str::to_string);
@@ -284,7 +283,7 @@ fn made_by(dossier: &Dossier, again: &Path, spell: Spell) -> Vec<String> {
     vec![gaits, spell(&train.option("out", again))]
 }
 
-/// The keys of `[stimulus]`, `[train]` and `[validation]` with their values, those at their defaults too.
+/// Returns the keys of `[stimulus]`, `[train]` and `[validation]` with values, defaults included.
 fn seeing_and_training(config: &Config) -> Settings {
     let mut settings = Settings::new();
     for (section, keys) in [
@@ -305,8 +304,7 @@ fn seeing_and_training(config: &Config) -> Settings {
     settings
 }
 
-/// A command with the settings of a capacity, as far as its file has them, where they are not the
-/// defaults.
+/// Adds those settings of a capacity to a command that its file has and that are not the defaults.
 fn with_settings(command: Invocation, file: &CapacityFile) -> Invocation {
     let usual = CapacityConfig::default();
     let mut command =
