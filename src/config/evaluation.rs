@@ -1,9 +1,10 @@
 //! [`EvaluationConfig`]: a config's section `[evaluation]`, and the rules of response fitness.
 
 use crate::base::error::Error;
-use crate::body::{Body, key};
 use crate::config::Config;
+use crate::response::objective::GaitResponse;
 use crate::task::fitness::{Fitness, LEAST_IMAGES};
+use crate::task::objective::{Objective, Recognition};
 use crate::task::protocol::RolloutMode;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -28,27 +29,11 @@ impl Config {
         self.evaluation.fitness == Fitness::Response
     }
 
-    /// Returns the key of an evaluated body: its own, or that of its probe if fitness is a
-    /// response. Then a gait is evaluated once, whatever its sensors.
-    pub(crate) fn known_key(&self, body: &Body) -> [u8; 16] {
+    /// Returns what evolution maximises.
+    pub fn objective(&self) -> &'static dyn Objective {
         match self.measures_response() {
-            true => key(&body.probe()),
-            false => key(body),
-        }
-    }
-
-    /// Returns the factor of a body's fitness: 1, or for a response the square root of the number
-    /// of its soft voxels and sensors, up to two thirds of its grid. Of two gaits with equally
-    /// strong responses, the one with more places can be trained further: together they can move it
-    /// by at most this factor (Cauchy's inequality), and only if all respond alike. The limit is
-    /// there because something has to walk.
-    pub(crate) fn place_factor(&self, body: &Body) -> f64 {
-        match self.measures_response() {
-            true => {
-                let most = body.height() * body.width() * 2 / 3;
-                (body.probe().counts().sensor.clamp(1, most.max(1)) as f64).sqrt()
-            }
-            false => 1.0,
+            true => &GaitResponse,
+            false => &Recognition,
         }
     }
 

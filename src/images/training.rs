@@ -6,7 +6,6 @@ use crate::base::remedy::Remedy;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, DatasetError, Split};
 use crate::images::whereabouts::{load_dataset, see};
-use crate::response::random_images;
 use crate::store::images::{DatasetRef, ImageRef, answers};
 use crate::task::perturbation::Condition;
 use crate::task::score::Answer;
@@ -105,16 +104,10 @@ impl Training {
     pub fn of(config: &Config, dataset: &Dataset) -> Result<Self, Error> {
         let images = Training::images(config, dataset)?;
         let seen = |image: &ImageRef| see(config, dataset, Split::Train, image.index);
-        let mut stimuli: Vec<Grid<f64>> = images.iter().map(seen).collect::<Result<_, _>>()?;
+        let stimuli: Vec<Grid<f64>> = images.iter().map(seen).collect::<Result<_, _>>()?;
         let train_sha256 = dataset.fingerprint(Split::Train).expect("its images were read just now");
         let dataset = DatasetRef { name: dataset.name().to_string(), train_sha256 };
-        let conditions = match config.measures_response() {
-            true => {
-                stimuli = random_images::opposites(&stimuli, &config.physics, config.seed);
-                random_images::conditions(images.len())
-            }
-            false => Vec::new(),
-        };
+        let (stimuli, conditions) = config.objective().prepare(stimuli, &config.physics, config.seed);
         Ok(Training { dataset, images, stimuli, conditions })
     }
 

@@ -4,6 +4,6 @@
 pub mod estimate;
 pub mod gait;
 pub mod lesson;
+pub mod objective;
 pub mod probing;
-pub mod random_images;
 pub mod regression;

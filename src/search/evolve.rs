@@ -16,7 +16,6 @@ use crate::images::training::Training;
 use crate::images::whereabouts;
 use crate::images::whereabouts::Whereabouts;
 use crate::qd::{ArchiveStats, DescriptorSpace, Evaluated, MapElites, Proposal, Variation};
-use crate::response::random_images::is_left_behind;
 use crate::search::{resume, validation};
 use crate::store::checkpoint;
 use crate::store::checkpoint::{Checkpoint, KnownBodies};
@@ -25,7 +24,7 @@ use crate::store::metrics::{Metrics, Totals};
 use crate::store::names::{ELITES, METRICS, RUN_JSON, TRAINING_JSON};
 use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
 use crate::store::validation::Validated;
-use crate::task::evaluation::{Evaluation, Job, MayWin, Outcome, evaluate};
+use crate::task::evaluation::{Evaluation, Job, Outcome, evaluate};
 use crate::task::grouping::Grouping;
 use rayon::prelude::*;
 use std::path::PathBuf;
@@ -325,11 +324,11 @@ impl<'a> Run<'a> {
     /// from now on.
     fn unknown(&mut self, children: Vec<Child>) -> (Vec<Child>, Vec<[u8; 16]>) {
         let config = &self.options.config;
-        // A gait whose response is known would fill the archive with its sensors.
-        let saves_known = config.savings.known_bodies || config.measures_response();
+        let objective = config.objective();
+        let saves_known = config.savings.known_bodies || !objective.may_repeat();
         let (mut fresh, mut new) = (Vec::new(), Vec::new());
         for child in children {
-            let key = config.known_key(&child.2.body);
+            let key = objective.known_key(&child.2.body);
             let is_new = self.known.insert(key);
             if is_new {
                 new.push(key);
@@ -341,18 +340,17 @@ impl<'a> Run<'a> {
         (fresh, new)
     }
 
-    /// Shows the training images to children, or, where a response is measured, to their probes.
+    /// Shows the training images to what is simulated for children.
     fn scored(&self, children: &[Child], session: &Session) -> Result<Vec<Evaluation>, Error> {
         let config = &self.options.config;
         let Training { stimuli, conditions, .. } = &self.training;
-        let probes: Vec<Body> = match config.measures_response() {
-            true => children.iter().map(|(_, _, robot)| robot.body.probe()).collect(),
-            false => Vec::new(),
-        };
+        let simulated = |(_, _, robot): &'_ Child| config.objective().simulated(&robot.body).into_owned();
+        let bodies: Vec<Body> = children.iter().map(simulated).collect();
         let thresholds = self.admission_thresholds();
-        let jobs = children.iter().map(|(_, parent, robot)| self.job(*parent, robot, &thresholds));
-        let mut jobs: Vec<Job> = jobs.collect();
-        jobs.iter_mut().zip(&probes).for_each(|(job, probe)| job.body = probe);
+        let children = children.iter().zip(&bodies);
+        let jobs: Vec<Job> = children
+            .map(|((_, parent, robot), body)| self.job(*parent, robot, body, &thresholds))
+            .collect();
         let (physics, protocol) = (&config.physics, &config.protocol);
         let ranks = self.session.ranks;
         let sizes: Vec<u64> = jobs.iter().map(|job| job.body.counts().total as u64).collect();
@@ -392,33 +390,34 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// How a robot is to be evaluated; `parent` is the cell of its parent.
-    fn job<'b>(&'b self, parent: Option<usize>, robot: &'b Robot, thresholds: &[Option<f64>]) -> Job<'b> {
+    /// How a robot is to be evaluated, for which `body` is simulated; `parent` is the cell of its
+    /// parent.
+    fn job<'b>(
+        &'b self,
+        parent: Option<usize>,
+        robot: &Robot,
+        body: &'b Body,
+        thresholds: &[Option<f64>],
+    ) -> Job<'b> {
         let (archive, training, grouping) = (self.search.archive(), &self.training, &self.grouping);
-        let config = &self.options.config;
-        let places = config.place_factor(&robot.body);
+        let objective = self.options.config.objective();
+        let factor = objective.factor(&robot.body);
         let bins = robot.bins();
         let to_beat = |task: usize| {
             let cell = self.space.index(&self.cell(bins.clone(), task));
             let in_cell = cell.and_then(|cell| archive.objective(cell));
-            in_cell.into_iter().chain(thresholds[task]).reduce(f64::max).map(|least| least / places)
+            in_cell.into_iter().chain(thresholds[task]).reduce(f64::max).map(|least| least / factor)
         };
         let to_beat: Vec<Option<f64>> = (0..grouping.tasks().len()).map(to_beat).collect();
-        let (order, given_up) = if config.measures_response() {
-            let least = to_beat.iter().flatten().fold(f64::INFINITY, |least, next| least.min(*next));
-            let given_up = move |known: &[Option<f64>]| least.is_finite() && is_left_behind(known, least);
-            // The first pairs decide whether the others are worth it.
-            (Vec::new(), Some(Box::new(given_up) as Box<MayWin>))
-        } else {
-            let of_parent = parent
-                .and_then(|cell| archive.get(cell))
-                .map(|elite| training.answers(elite.solution.displacements.iter().copied().map(Some)));
-            (of_parent.map_or_else(Vec::new, |answers| grouping.hardest_first(&answers)), None)
-        };
+        let of_parent = parent
+            .and_then(|cell| archive.get(cell))
+            .map(|elite| training.answers(elite.solution.displacements.iter().copied().map(Some)));
+        let (order, given_up) =
+            (objective.order(grouping, of_parent.as_deref()), objective.given_up(&to_beat));
         let may_win = move |known: &[Option<f64>]| {
             grouping.can_still_win(&training.answers(known.iter().copied()), |task| to_beat[task])
         };
-        Job { body: &robot.body, order, may_win: Box::new(may_win), given_up }
+        Job { body, order, may_win: Box::new(may_win), given_up }
     }
 
     /// A robot as it is told to the archive; `None` if it is not among the fittest that stay.
@@ -434,7 +433,7 @@ impl<'a> Run<'a> {
         let coordinates = self.cell(robot.bins(), score.task);
         let cell = self.space.index(&coordinates).expect("the coordinates are bins of this very space");
         let task = self.grouping.tasks()[score.task].name();
-        let objective = self.options.config.place_factor(&robot.body) * score.fitness;
+        let objective = self.options.config.objective().factor(&robot.body) * score.fitness;
         let solution = Robot { cell: coordinates, task, objective, displacements, ..robot };
         let is_in = thresholds[score.task].is_none_or(|threshold| objective > threshold);
         is_in.then_some(Evaluated { child, cell, objective, solution })

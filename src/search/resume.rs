@@ -84,7 +84,7 @@ fn without_checkpoint(path: &Path) -> Result<Checkpoint, Error> {
     }
     let mut known_bodies = KnownBodies::default();
     for robot in &run.elites {
-        known_bodies.insert(run.config.known_key(&robot.body));
+        known_bodies.insert(run.config.objective().known_key(&robot.body));
     }
     Ok(Checkpoint { run, totals: Totals::default(), known_bodies })
 }

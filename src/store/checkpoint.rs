@@ -31,7 +31,7 @@ impl Checkpoint {
     fn check(&self) -> Result<(), Error> {
         self.run.check().map_err(|error| error.in_place("run"))?;
         let RunFile { config, elites, .. } = &self.run;
-        let key = |robot: &Robot| config.known_key(&robot.body);
+        let key = |robot: &Robot| config.objective().known_key(&robot.body);
         match elites.iter().find(|robot| !self.known_bodies.0.contains(&key(robot))) {
             Some(robot) => {
                 Err(Error::input(format!("known_bodies: expected the body of elite {} among them", robot.id)))

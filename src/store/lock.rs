@@ -392,9 +392,9 @@ fn is_alive(path: &Path, before: &Holder, dead_after: Duration, session: &Sessio
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::base::observer::Observer;
     use crate::base::error::ErrorKind;
     use crate::base::files::write_atomically;
+    use crate::base::observer::Observer;
 
     use std::sync::atomic::AtomicBool;
 

@@ -6,6 +6,7 @@ pub mod fitness;
 pub mod grouping;
 pub mod judge;
 pub mod margins;
+pub mod objective;
 pub mod perturbation;
 pub mod protocol;
 pub mod recording;

@@ -1,12 +1,18 @@
-//! Runs with `fitness = "response"`: their random images and conditions, and early stopping.
+//! [`GaitResponse`]: the objective of runs with `fitness = "response"`.
 
 use crate::base::Grid;
 use crate::base::random::{Purpose, stream};
+use crate::body::Body;
 use crate::response::gait::random_image;
 use crate::sim::Physics;
+use crate::task::evaluation::MayWin;
 use crate::task::fitness::LEAST_IMAGES;
 use crate::task::fitness::response_so_far;
+use crate::task::grouping::Grouping;
+use crate::task::objective::Objective;
 use crate::task::perturbation::{Condition, of_response};
+use crate::task::score::Answer;
+use std::borrow::Cow;
 
 /// Index of evolution's random images, unlike that of a training's, which is 0.
 const OF_EVOLUTION: u64 = 1 << 32;
@@ -18,7 +24,7 @@ const WORTH_GOING_ON: f64 = 0.5;
 /// Returns as many images as there are training images, an even number, in pairs: one whose pixels
 /// are bright, dark or at rest at random, independently of each other, and its opposite. Pixels
 /// that are the same in all training images keep their values: a constant carries no information.
-pub(crate) fn opposites(stimuli: &[Grid<f64>], physics: &Physics, seed: u64) -> Vec<Grid<f64>> {
+fn opposites(stimuli: &[Grid<f64>], physics: &Physics, seed: u64) -> Vec<Grid<f64>> {
     let Some(first) = stimuli.first() else { return Vec::new() };
     let changes = Grid::from_fn(first.height(), first.width(), |row, column| {
         stimuli.iter().any(|other| other[(row, column)] != first[(row, column)])
@@ -42,7 +48,7 @@ pub(crate) fn opposites(stimuli: &[Grid<f64>], physics: &Physics, seed: u64) -> 
 }
 
 /// Returns the condition of each image; both images of a pair have the same.
-pub(crate) fn conditions(images: usize) -> Vec<Condition> {
+fn conditions(images: usize) -> Vec<Condition> {
     of_response()
         .into_iter()
         .flat_map(|condition| [condition.clone(), condition])
@@ -53,13 +59,56 @@ pub(crate) fn conditions(images: usize) -> Vec<Condition> {
 
 /// Returns true if, after the first half of its pairs (at least two of each condition), a body is
 /// so far from the response to beat that the rest is not worth simulating.
-pub(crate) fn is_left_behind(known: &[Option<f64>], to_beat: f64) -> bool {
+fn is_left_behind(known: &[Option<f64>], to_beat: f64) -> bool {
     // Two images a pair; equally many pairs of each condition.
     let first = (known.len() / 8 * 4).max(LEAST_IMAGES).min(known.len());
     known[..first].iter().all(Option::is_some)
         && to_beat > 0.0
         && response_so_far(known[..first].iter().copied())
             .is_some_and(|response| response < WORTH_GOING_ON * to_beat)
+}
+
+/// The response of a gait: the probe of a body, all of whose soft voxels and sensors see a pixel,
+/// walks under random images.
+pub(crate) struct GaitResponse;
+
+impl Objective for GaitResponse {
+    fn prepare(
+        &self,
+        stimuli: Vec<Grid<f64>>,
+        physics: &Physics,
+        seed: u64,
+    ) -> (Vec<Grid<f64>>, Vec<Condition>) {
+        (opposites(&stimuli, physics, seed), conditions(stimuli.len()))
+    }
+
+    fn simulated<'b>(&self, body: &'b Body) -> Cow<'b, Body> {
+        Cow::Owned(body.probe())
+    }
+
+    /// A gait whose response is known would fill the archive with its sensors.
+    fn may_repeat(&self) -> bool {
+        false
+    }
+
+    /// The square root of the number of soft voxels and sensors, up to two thirds of the grid. Of
+    /// two gaits with equally strong responses, the one with more places can be trained further:
+    /// together they can move it by at most this factor (Cauchy's inequality), and only if all
+    /// respond alike. The limit is there because something has to walk.
+    fn factor(&self, body: &Body) -> f64 {
+        let most = body.height() * body.width() * 2 / 3;
+        (body.probe().counts().sensor.clamp(1, most.max(1)) as f64).sqrt()
+    }
+
+    /// The first pairs decide whether the others are worth it.
+    fn order(&self, _: &Grouping, _: Option<&[Answer]>) -> Vec<usize> {
+        Vec::new()
+    }
+
+    fn given_up(&self, to_beat: &[Option<f64>]) -> Option<Box<MayWin<'static>>> {
+        let least = to_beat.iter().flatten().fold(f64::INFINITY, |least, next| least.min(*next));
+        Some(Box::new(move |known| least.is_finite() && is_left_behind(known, least)))
+    }
 }
 
 #[cfg(test)]
