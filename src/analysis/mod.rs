@@ -2,6 +2,9 @@
 //! paper's own numbers.
 
 pub mod baselines;
+pub mod dossier;
+pub mod progress;
 pub mod published;
+pub mod sweep;
 pub mod verdict;
 pub mod votes;

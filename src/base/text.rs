@@ -55,6 +55,18 @@ pub fn is_unseen(c: char) -> bool {
             | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}')
 }
 
+/// Formats a time span in its two largest units: "45 s", "12 min 3 s", "3 h 20 min", "2 d 4 h".
+pub fn duration(seconds: f64) -> String {
+    let whole = if seconds.is_finite() { seconds.max(0.0).round() as u64 } else { 0 };
+    let (minutes, hours, days) = (whole / 60, whole / 3600, whole / 86400);
+    match (days, hours, minutes) {
+        (0, 0, 0) => format!("{whole} s"),
+        (0, 0, m) => format!("{m} min {} s", whole % 60),
+        (0, h, m) => format!("{h} h {} min", m % 60),
+        (d, h, _) => format!("{d} d {} h", h % 24),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -84,5 +96,11 @@ mod tests {
         assert_eq!(one_line(&"\x1b".repeat(MOST)).chars().count(), MOST + 3);
         assert_eq!(shortened("abcdef", 6), "abcdef");
         assert_eq!(shortened("abcdefg", 4), "ab … fg");
+    }
+
+    #[test]
+    fn durations_have_two_units_at_most() {
+        let spans = [0.4, 45.0, 723.0, 12_000.0, 187_200.0, f64::NAN].map(duration);
+        assert_eq!(spans, ["0 s", "45 s", "12 min 3 s", "3 h 20 min", "2 d 4 h", "0 s"]);
     }
 }

@@ -1,12 +1,16 @@
 //! `morphcog plot`: its words, and what it calls.
 
 use crate::base::error::Error;
+use crate::base::session::Session;
+use crate::base::stop::NEVER;
 use crate::cli::choice;
 use crate::cli::choice::{Archives, ROBOTS, selected};
 use crate::cli::output::console::Console;
-use crate::cli::output::figures;
-use crate::cli::output::figures::{Kind, Wanted};
+use crate::cli::output::reporters::Reporter;
+use crate::cli::output::sweeps;
 use crate::cli::values::{MOST, offering, seed, whole};
+use crate::commands::plot;
+use crate::commands::plot::{Kind, Wanted};
 use crate::commands::replay::{Options, Shown};
 use crate::draw::plot::Background;
 use crate::robots::selection::{BEST, Selection};
@@ -83,9 +87,9 @@ pub(super) fn run(args: PlotArgs, console: &Console) -> Result<(), Error> {
     let PlotArgs { kind, physical_only, images, data, dataset, .. } = args;
     let archives = args.archives.paths();
     // What is wrong with the file is to be known before robots are searched for.
-    figures::endings(args.out.as_deref())?;
+    plot::endings(args.out.as_deref())?;
     let robots: Vec<Named> = match selected(args.robot)? {
-        Some(_) if !kind.is_of_robot() => return Err(figures::no_robot(kind)),
+        Some(_) if !kind.is_of_robot() => return Err(plot::no_robot(kind)),
         None if !kind.is_of_robot() => {
             choice::say_unfinished(&archives, console);
             Vec::new()
@@ -107,5 +111,8 @@ pub(super) fn run(args: PlotArgs, console: &Console) -> Result<(), Error> {
         dpi: args.dpi,
         background: if args.transparent { Background::Transparent } else { Background::Paper },
     };
-    figures::make(console, &wanted).map(|_| ())
+    let made = plot::plot(&wanted, &Session::new(&NEVER, &Reporter::new(console)))?;
+    made.files.iter().for_each(|path| console.line_about(path, &format!("wrote {}", path.display())));
+    sweeps::differences(console, &made.progress);
+    Ok(())
 }

@@ -1,5 +1,6 @@
 //! `morphcog report`: its words, and what it calls.
 
+use crate::analysis::dossier;
 use crate::base::error::Error;
 use crate::base::number;
 use crate::cli::choice;
@@ -7,7 +8,6 @@ use crate::cli::choice::{Archives, Runs, run_jsons};
 use crate::cli::explain::spell;
 use crate::cli::output::console::Console;
 use crate::cli::values::{MOST, whole};
-use crate::commands::report;
 use crate::draw::error::write_whole;
 use crate::draw::report::Content;
 use crate::store::folder;
@@ -60,7 +60,7 @@ pub(super) fn run(args: ReportArgs, console: &Console) -> Result<(), Error> {
     let out = args.out.unwrap_or_else(|| folder::beside_all(&archives, "report.html"));
     folder::writable(&out)?;
     let gathered =
-        report::gather(&archives, args.data.as_deref(), args.rollouts > 0, &|text| console.warning(text))?;
+        dossier::gather(&archives, args.data.as_deref(), args.rollouts > 0, &|text| console.warning(text))?;
     let rollouts = args.rollouts.div_ceil(archives.len());
     let content = Content { gathered: &gathered, rollouts, spell: &spell };
     let page = {

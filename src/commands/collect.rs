@@ -1,10 +1,10 @@
 //! What the tasks of a sweep found, in one table.
 
+use crate::analysis::progress::Progress;
+use crate::analysis::sweep::{Collected, Row, RunRow, Tested};
 use crate::base::error::Error;
-use crate::base::table;
 use crate::commands::eval;
 use crate::commands::eval::own_name;
-use crate::commands::plot::Progress;
 use crate::commands::tasks::steps::test_of;
 use crate::commands::tasks::task::another;
 use crate::commands::tasks::{Place, Status, Task};
@@ -14,74 +14,8 @@ use crate::store::images::HeldOut;
 use crate::store::names::{METRICS, RUN_JSON};
 use crate::store::run::RunFile;
 use crate::store::run::StoredRun;
-use crate::store::task::State;
 use crate::store::validation::ranking;
-use serde::Serialize;
 use std::path::PathBuf;
-
-/// What a task found on one of the tasks that its robots do, as 0|1.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Row {
-    /// The task's number in the sweep, from 1.
-    pub number: usize,
-    /// Its name.
-    pub name: String,
-    /// How far it is.
-    pub state: State,
-    /// Varied keys with its values.
-    pub varied: Vec<(String, String)>,
-    /// Its run, as far as there is one.
-    pub run: Option<RunRow>,
-}
-
-/// What a run found on one task.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RunRow {
-    /// What is told apart, as "0|1".
-    pub recognises: String,
-    /// Generations done.
-    pub generations: u64,
-    /// Wall-clock time of the run \[s\].
-    pub seconds: f64,
-    /// Elites of this task.
-    pub num_elites: usize,
-    /// Largest objective of them.
-    pub obj_max: Option<f64>,
-    /// Balanced accuracy of the first robot on validation images, from 0 to 1.
-    pub validation: Option<f64>,
-    /// Robots audited, and how many of them are physical.
-    pub audited: Option<[usize; 2]>,
-    /// How robots did on held-out images.
-    pub tested: Option<Tested>,
-}
-
-/// A test.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Tested {
-    /// Which images.
-    pub split: HeldOut,
-    /// How many.
-    pub images: usize,
-    /// Robots.
-    pub robots: usize,
-    /// Their mean accuracy, from 0 to 1.
-    pub accuracy: f64,
-    /// Its 95 % interval: of one robot over images, of several over robots.
-    pub interval: Option<[f64; 2]>,
-    /// Their mean balanced accuracy.
-    pub balanced: f64,
-}
-
-/// Everything that is collected.
-#[derive(Clone, Debug)]
-pub struct Collected {
-    /// A row per task and what its robots tell apart.
-    pub rows: Vec<Row>,
-    /// How the runs that evolved came along.
-    pub progress: Vec<Progress>,
-    /// The run.json files, for commands that take several.
-    pub archives: Vec<PathBuf>,
-}
 
 /// Collects what the tasks found so far; `status` is of the same tasks. `warn` is told of audits and
 /// tests that cannot be read, or are of another state of their run: these are left out.
@@ -245,86 +179,4 @@ fn is_planned_test(
             false
         }
     }
-}
-
-/// What a row says of its run, as the columns of `sweep.csv`; nothing where there is none.
-#[derive(Debug, Default, Serialize)]
-pub struct Columns<'a> {
-    recognises: Option<&'a str>,
-    generations: Option<u64>,
-    seconds: Option<f64>,
-    num_elites: Option<usize>,
-    obj_max: Option<f64>,
-    validation_balanced_accuracy: Option<f64>,
-    audited: Option<usize>,
-    physical: Option<usize>,
-    split: Option<HeldOut>,
-    images: Option<usize>,
-    robots: Option<usize>,
-    accuracy: Option<f64>,
-    accuracy_low: Option<f64>,
-    accuracy_high: Option<f64>,
-    balanced_accuracy: Option<f64>,
-}
-
-impl<'a> Columns<'a> {
-    /// Their names, in order.
-    const NAMES: [&'static str; 15] = [
-        "recognises",
-        "generations",
-        "seconds",
-        "num_elites",
-        "obj_max",
-        "validation_balanced_accuracy",
-        "audited",
-        "physical",
-        "split",
-        "images",
-        "robots",
-        "accuracy",
-        "accuracy_low",
-        "accuracy_high",
-        "balanced_accuracy",
-    ];
-
-    /// Of a row.
-    pub fn of(row: &'a Row) -> Self {
-        let Some(run) = &row.run else { return Columns::default() };
-        let tested = run.tested.as_ref();
-        let interval = tested.and_then(|tested| tested.interval);
-        Columns {
-            recognises: Some(&run.recognises),
-            generations: Some(run.generations),
-            seconds: Some(run.seconds),
-            num_elites: Some(run.num_elites),
-            obj_max: run.obj_max,
-            validation_balanced_accuracy: run.validation,
-            audited: run.audited.map(|[all, _]| all),
-            physical: run.audited.map(|[_, physical]| physical),
-            split: tested.map(|tested| tested.split),
-            images: tested.map(|tested| tested.images),
-            robots: tested.map(|tested| tested.robots),
-            accuracy: tested.map(|tested| tested.accuracy),
-            accuracy_low: interval.map(|[low, _]| low),
-            accuracy_high: interval.map(|[_, high]| high),
-            balanced_accuracy: tested.map(|tested| tested.balanced),
-        }
-    }
-}
-
-/// The table as CSV: a row per task and what its robots tell apart; a column per varied key.
-pub fn csv(rows: &[Row]) -> Vec<u8> {
-    let mut keys: Vec<&String> = rows.iter().flat_map(|row| row.varied.iter().map(|(key, _)| key)).collect();
-    keys.sort_unstable();
-    keys.dedup();
-    let about = ["number", "name", "state"].map(str::to_string);
-    let varied = keys.iter().map(|key| format!("varied_{key}"));
-    let fields = rows.iter().map(|row| {
-        let of =
-            |key: &&String| row.varied.iter().find(|(own, _)| own == *key).map(|(_, value)| value.as_str());
-        let varied: Vec<Option<&str>> = keys.iter().map(of).collect();
-        ((row.number, &row.name, row.state.name()), varied, Columns::of(row))
-    });
-    let more = Columns::NAMES.map(str::to_string);
-    table::csv(about.into_iter().chain(varied).chain(more), fields)
 }

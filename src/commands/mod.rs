@@ -8,9 +8,9 @@ pub mod collect;
 pub mod data;
 pub mod eval;
 pub mod plan;
+#[cfg(feature = "figures")]
 pub mod plot;
 pub mod replay;
-pub mod report;
 pub mod reproduce;
 pub mod response;
 pub mod schema;

@@ -1,113 +1,369 @@
-//! `morphcog plot`: reads what figures are made of.
+//! `morphcog plot`: writes figures as SVG and PNG.
 
+use crate::analysis::progress::Progress;
 use crate::base::error::Error;
-use crate::config::{Settings, differing};
-use crate::store::metrics::{Moment, moments_of};
-use crate::store::run::RunFile;
-use crate::task::grouping::groups_text;
-use std::collections::BTreeSet;
-use std::path::Path;
+use crate::base::remedy::{Invocation, Remedy};
+use crate::base::session::Session;
+use crate::commands::replay;
+use crate::commands::replay::{Found, Options};
+use crate::draw::error::write_whole;
+use crate::draw::plot;
+use crate::draw::plot::{Background, Figure, PRINT};
+use crate::search::one_by_one::Named;
+use crate::shipped::exists;
+use crate::store::capacity::CapacityFile;
+use crate::store::eval::EvalFile;
+use crate::store::folder;
+use crate::store::names::METRICS;
+use crate::store::names::{CAPACITY_JSON, EVAL_JSON, RUN_JSON};
+use crate::store::run::{RunFile, different};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
-/// How a run came along.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Progress {
-    /// Name of the run.
-    pub run: String,
-    /// Its seed.
-    pub seed: u64,
-    /// What its fitness is measured in.
-    pub unit: Option<&'static str>,
-    /// A moment per generation, at least one.
-    pub moments: Vec<Moment>,
-    /// All that its results depend on but the seed.
-    pub settings: Settings,
+/// The subject of a figure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The voxels of a robot.
+    Body,
+    /// The position of a robot over time.
+    Spacetime,
+    /// Poses of a robot's rollout.
+    Snapshots,
+    /// The fitness in the archive.
+    Archive,
+    /// The metrics of a run.
+    Progress,
+    /// The results of `eval`.
+    Accuracy,
+    /// The results of `capacity`.
+    Capacity,
 }
 
-/// Runs that differ in nothing but the seed, and so belong together.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Group<'a> {
-    /// What tells it from the others, as "parents=10, 0|1".
-    pub label: String,
-    /// Its value of each key in which groups differ; none where it has no such key.
-    pub values: Vec<Option<String>>,
-    /// Its runs.
-    pub runs: Vec<&'a Progress>,
+impl Kind {
+    /// All kinds with their names.
+    pub const ALL: [(Kind, &str); 7] = [
+        (Kind::Body, "body"),
+        (Kind::Spacetime, "spacetime"),
+        (Kind::Snapshots, "snapshots"),
+        (Kind::Archive, "archive"),
+        (Kind::Progress, "progress"),
+        (Kind::Accuracy, "accuracy"),
+        (Kind::Capacity, "capacity"),
+    ];
+
+    /// Returns true if the figure shows one robot.
+    pub fn is_of_robot(self) -> bool {
+        matches!(self, Kind::Body | Kind::Spacetime | Kind::Snapshots)
+    }
 }
 
-/// Runs in groups, in the order of their first ones, and the keys in which these differ.
-pub fn alike(runs: &[Progress]) -> (Vec<String>, Vec<Group<'_>>) {
-    let mut groups: Vec<Vec<&Progress>> = Vec::new();
-    for run in runs {
-        match groups.iter_mut().find(|group| group[0].settings == run.settings) {
-            Some(group) => group.push(run),
-            None => groups.push(vec![run]),
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        Kind::ALL.iter().filter(|(kind, _)| kind == self).try_for_each(|(_, name)| f.write_str(name))
+    }
+}
+
+impl FromStr for Kind {
+    type Err = String;
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = Kind::ALL.iter().find(|(_, name)| *name == text);
+        let names = || Kind::ALL.map(|(_, name)| name).join(", ");
+        found.map(|(kind, _)| *kind).ok_or_else(|| format!("expected one of {}", names()))
+    }
+}
+
+/// The figures to make, and their files.
+#[derive(Clone, Debug)]
+pub struct Wanted {
+    /// The subject.
+    pub kind: Kind,
+    /// The run.json files; if empty, the newest under `runs/`.
+    pub archives: Vec<PathBuf>,
+    /// The robots, for kinds that show a robot.
+    pub robots: Vec<Named>,
+    /// The options that find robots and images; its own robot and archive are ignored.
+    pub options: Options,
+    /// The control steps between poses; 0 chooses them from the walk.
+    pub every: usize,
+    /// The file; `None` writes SVG and PNG beside the run.json.
+    pub out: Option<PathBuf>,
+    /// The pixels of PNG per inch; `None` is as for print, or as many as possible.
+    pub dpi: Option<u32>,
+    /// The background.
+    pub background: Background,
+}
+
+/// The files that were made.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// Their paths.
+    pub files: Vec<PathBuf>,
+    /// The runs in a figure of progress.
+    pub progress: Vec<Progress>,
+}
+
+/// A figure and its file without the extension.
+struct Made {
+    figure: Figure,
+    stem: PathBuf,
+}
+
+/// Makes figures, reports their files and returns these.
+///
+/// # Errors
+/// Returns an error if an input is invalid, or a figure cannot be made or written.
+pub fn plot(wanted: &Wanted, session: &Session) -> Result<Finished, Error> {
+    let endings = endings(wanted.out.as_deref())?;
+    let archives = match wanted.archives.as_slice() {
+        [] if !wanted.kind.is_of_robot() => vec![folder::newest_run()?],
+        archives => archives.to_vec(),
+    };
+    let count = match wanted.kind {
+        Kind::Progress => 1,
+        kind if kind.is_of_robot() => wanted.robots.len(),
+        _ => archives.len(),
+    };
+    if count > 1 && wanted.out.is_some() {
+        return Err(Error::usage(format!("expected with one figure only, these are {count}")).about("out"));
+    }
+    let named = |path: &Path, ending: &str| match path.extension() {
+        Some(_) => path.to_path_buf(),
+        None => with_ending(path, ending),
+    };
+    if let Some(path) = &wanted.out {
+        endings.iter().try_for_each(|ending| folder::writable(&named(path, ending)))?;
+    }
+    let (mut files, mut progress) = (Vec::new(), Vec::new());
+    let mut write = |made: Made| -> Result<(), Error> {
+        let figure = made.figure.on(wanted.background);
+        let made = |ending: &&str| -> Result<(PathBuf, Vec<u8>), Error> {
+            let path = match &wanted.out {
+                Some(path) => named(path, ending),
+                None => with_ending(&made.stem, ending),
+            };
+            let bytes = match *ending {
+                "svg" => figure.svg().into_bytes(),
+                _ => png(session, &path, &figure, wanted.dpi)?,
+            };
+            Ok((path, bytes))
+        };
+        // Makes all files before writing any.
+        for (path, bytes) in endings.iter().map(made).collect::<Result<Vec<_>, _>>()? {
+            write_whole(&path, &bytes)?;
+            files.push(path);
+        }
+        Ok(())
+    };
+    if wanted.kind == Kind::Progress {
+        let paths: Vec<&Path> = archives.iter().map(PathBuf::as_path).collect();
+        let runs: Vec<RunFile> = paths.iter().map(|path| RunFile::read(path)).collect::<Result<_, _>>()?;
+        let named = || paths.iter().copied().zip(&runs);
+        different(named())?;
+        let (mut lines, mut short) = (Vec::new(), Vec::new());
+        for (path, run) in named() {
+            let line = Progress::of(run, path)?;
+            match line.moments.len() {
+                0 | 1 => short.push(too_short(path, run, line.moments.len())),
+                _ => lines.push(line),
+            }
+        }
+        match short.first() {
+            Some(error) if lines.is_empty() => return Err(error.clone()),
+            _ => short.iter().for_each(|error| session.observer.warning(&format!("{error}; left out"))),
+        }
+        let figure = plot::progress(&lines);
+        let stem = folder::beside_all(&archives, &format!("plot-{}", wanted.kind));
+        write(Made { figure, stem })?;
+        progress = lines;
+    } else if wanted.kind.is_of_robot() {
+        for robot in &wanted.robots {
+            write(of_robot(wanted, robot)?)?;
+        }
+    } else {
+        if wanted.kind == Kind::Archive {
+            let runs: Vec<RunFile> =
+                archives.iter().map(|path| RunFile::read(path)).collect::<Result<_, _>>()?;
+            different(archives.iter().map(PathBuf::as_path).zip(&runs))?;
+        }
+        let made = |path: &PathBuf| -> Result<Made, Error> {
+            let stem = stem(path, wanted.kind, &result_name(wanted.kind, path));
+            Ok(Made { figure: of_run(wanted.kind, path)?, stem })
+        };
+        let all = archives.iter().map(made).collect::<Result<Vec<_>, _>>()?;
+        if let Some(dpi) = wanted.dpi.filter(|_| endings.contains(&"png")) {
+            all.iter().try_for_each(|made| possible(&made.figure, dpi))?;
+        }
+        all.into_iter().try_for_each(write)?;
+    }
+    Ok(Finished { files, progress })
+}
+
+/// Encodes a figure as PNG; notes if its resolution is lower than usual.
+fn png(session: &Session, path: &Path, figure: &Figure, dpi: Option<u32>) -> Result<Vec<u8>, Error> {
+    if let Some(dpi) = dpi {
+        possible(figure, dpi)?;
+        return Ok(figure.png(dpi)?);
+    }
+    let fitting = figure.fitting(PRINT);
+    if fitting < PRINT {
+        let text = format!("{fitting} pixels per inch, because with {PRINT} it would be too large");
+        session.observer.note(&format!("note: {}: {text}", path.display()));
+    }
+    Ok(figure.print()?)
+}
+
+/// Checks that a figure can have so many pixels per inch.
+fn possible(figure: &Figure, dpi: u32) -> Result<(), Error> {
+    let most = figure.fitting(dpi);
+    match most < dpi {
+        true => {
+            let text = format!("{}: expected at most {most}, or an .svg file", figure.title());
+            Err(Error::argument("dpi", dpi, text))
+        }
+        false => Ok(()),
+    }
+}
+
+/// Returns the formats that a file name implies.
+///
+/// # Errors
+/// Returns an error if the extension is not that of a figure.
+pub fn endings(out: Option<&Path>) -> Result<Vec<&'static str>, Error> {
+    let Some(path) = out else { return Ok(vec!["svg", "png"]) };
+    folder::of_file(path)?;
+    match path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).as_deref() {
+        None => Ok(vec!["svg", "png"]),
+        Some("svg") => Ok(vec!["svg"]),
+        Some("png") => Ok(vec!["png"]),
+        Some(_) => {
+            let text = "expected a file name that ends in .svg or .png";
+            Err(Error::argument("out", path.display(), text))
         }
     }
-    let from_first = |group: &Vec<&Progress>| differing(&groups[0][0].settings, &group[0].settings);
-    let keys: BTreeSet<String> = groups.iter().flat_map(from_first).map(|(key, ..)| key).collect();
-    let value = |run: &Progress, key: &String| run.settings.get(key).map(spoken);
-    let group = |runs: &Vec<&'_ Progress>| -> (String, Vec<Option<String>>) {
-        let values: Vec<Option<String>> = keys.iter().map(|key| value(runs[0], key)).collect();
-        let word = |(key, value): (&String, &Option<String>)| match (key.as_str(), value) {
-            ("task.groups", Some(value)) => Some(value.clone()),
-            (_, None) => None,
-            (key, Some(value)) => Some(format!("{}={value}", key.rsplit('.').next().unwrap_or(key))),
-        };
-        let words: Vec<String> = keys.iter().zip(&values).filter_map(word).collect();
-        // Two configs with the same settings may have two names, and are one group all the same.
-        (if words.is_empty() { runs[0].run.clone() } else { words.join(", ") }, values)
-    };
-    let described: Vec<(String, Vec<Option<String>>)> = groups.iter().map(group).collect();
-    let keys = keys.into_iter().collect();
-    let group = |((label, values), runs)| Group { label, values, runs };
-    (keys, described.into_iter().zip(groups).map(group).collect())
 }
 
-/// A value of a config for people: groups of classes as 0|1.
-fn spoken(value: &toml::Value) -> String {
-    let classes = |list: &toml::Value| -> Option<Vec<u8>> {
-        list.as_array()?.iter().map(|class| class.as_integer().and_then(|c| u8::try_from(c).ok())).collect()
-    };
-    let groups = || -> Option<String> {
-        let [a, b] = value.as_array()?.as_slice() else { return None };
-        Some(groups_text([&classes(a)?, &classes(b)?], "|"))
-    };
-    groups().unwrap_or_else(|| value.as_str().map_or_else(|| value.to_string(), str::to_string))
+fn with_ending(stem: &Path, ending: &str) -> PathBuf {
+    let mut name = stem.as_os_str().to_owned();
+    name.push(".");
+    name.push(ending);
+    PathBuf::from(name)
 }
 
-impl Progress {
-    /// Reads the metrics.csv beside a run.json.
-    ///
-    /// # Errors
-    /// What is missing or wrong, with its line.
-    pub fn of(run: &RunFile, archive: &Path) -> Result<Self, Error> {
-        let moments = moments_of(run, archive)?;
-        let unit = run.fitness().unit();
-        let mut settings = run.config.settings();
-        settings.remove("seed");
-        Ok(Progress { run: run.name.clone(), seed: run.config.seed, unit, moments, settings })
+/// Returns the error for a robot named with a kind of figure that shows none.
+pub fn no_robot(kind: Kind) -> Error {
+    let of_robots = Kind::ALL.iter().filter(|(kind, _)| kind.is_of_robot()).map(|(_, name)| *name);
+    let of_robots = of_robots.collect::<Vec<_>>().join(", ");
+    let text = format!("plot {kind} shows no single robot; expected with {of_robots} only");
+    Error::usage(text).about("robot")
+}
+
+/// Returns the error for a run with too few generations for a line.
+fn too_short(path: &Path, run: &RunFile, generations: usize) -> Error {
+    let path = path.with_file_name(METRICS);
+    let text = format!("{}: expected at least 2 generations, found {generations}", path.display());
+    match run.origin {
+        Some(_) => Error::input(text)
+            .remedy(Remedy::Run(Invocation::new("plot").value("accuracy"), "shows what its test found")),
+        None => Error::input(text),
     }
+}
+
+/// `plot-<kind>[-robot]` beside a run.json.
+fn stem(archive: &Path, kind: Kind, robot: &str) -> PathBuf {
+    let name = if robot.is_empty() { format!("plot-{kind}") } else { format!("plot-{kind}-{robot}") };
+    folder::beside(archive, &name)
+}
+
+fn of_robot(wanted: &Wanted, named: &Named) -> Result<Made, Error> {
+    let Named { archive, robot } = named.clone();
+    let options = Options { robot, archive: Some(archive.clone()), ..wanted.options.clone() };
+    let made = |found: &Found, figure| Made { figure, stem: stem(&archive, wanted.kind, &found.name) };
+    if wanted.kind == Kind::Body {
+        let found = replay::find(&options)?;
+        return Ok(made(&found, plot::body(&found.body, &found.title())));
+    }
+    let subject = replay::subject(&options)?;
+    let title = subject.found.title();
+    let recording = replay::record_subject(&subject);
+    let figure = match wanted.kind {
+        Kind::Snapshots => plot::snapshots(&recording, wanted.every, &title),
+        _ => plot::spacetime(&recording, &title),
+    }?;
+    Ok(made(&subject.found, figure))
+}
+
+fn of_run(kind: Kind, path: &Path) -> Result<Figure, Error> {
+    let maker = if kind == Kind::Accuracy { "eval" } else { "capacity" };
+    let with_maker = |error: Error| match error.remedies.is_empty() {
+        true => error.remedy(Remedy::Run(Invocation::new(maker), "makes it")),
+        false => error,
+    };
+    match kind {
+        Kind::Accuracy => {
+            let beside = result(path, EVAL_JSON);
+            let report = match beside == *path {
+                true => EvalFile::read(path),
+                false => RunFile::read(path).and_then(|run| EvalFile::of_runs(&beside, &[&run])),
+            };
+            let (report, path) = (report.map_err(with_maker)?, beside);
+            if report.robots.is_empty() {
+                let text = format!("{}: robots: expected at least one, found none", path.display());
+                return Err(with_maker(Error::input(text)));
+            }
+            Ok(plot::accuracy(&report))
+        }
+        Kind::Capacity => {
+            let (beside, eval) = (result(path, CAPACITY_JSON), folder::beside(path, EVAL_JSON));
+            let file = CapacityFile::read(&beside).map_err(with_maker)?;
+            if beside != *path {
+                let run = RunFile::read(path)?;
+                let is_of_it = match exists(&eval) {
+                    // The runs of its robots.
+                    true => file.is_of(&EvalFile::of_runs(&eval, &[&run])?),
+                    false => file.run == run.name,
+                };
+                if !is_of_it {
+                    let text = format!("{}: it is about the robots of another run", beside.display());
+                    let remedy = Remedy::Run(Invocation::new("capacity"), "makes that of this run");
+                    return Err(Error::input(text).remedy(remedy));
+                }
+            }
+            Ok(plot::capacity(&file))
+        }
+        _ => RunFile::read(path).map(|run| plot::archive(&run)),
+    }
+}
+
+/// Returns the usual result file of a run.json, or the given file itself if it is no run.json.
+fn result(path: &Path, name: &str) -> PathBuf {
+    match path.file_name().is_some_and(|given| given == RUN_JSON) {
+        true => folder::beside(path, name),
+        false => path.to_path_buf(),
+    }
+}
+
+/// Returns the part of a figure's name that comes from a directly named result file.
+fn result_name(kind: Kind, path: &Path) -> String {
+    let is_result = matches!(kind, Kind::Accuracy | Kind::Capacity);
+    let stem =
+        path.file_stem().filter(|_| is_result && path.file_name().is_some_and(|name| name != RUN_JSON));
+    stem.map_or(String::new(), |stem| stem.to_string_lossy().into_owned())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn run(seed: u64, config: &str) -> Progress {
-        let set = |config: &str| toml::from_str::<Settings>(config).unwrap();
-        Progress { run: "toy".into(), seed, unit: None, moments: Vec::new(), settings: set(config) }
-    }
-
     #[test]
-    fn runs_that_differ_in_the_seed_only_are_one_group() {
-        let (a, b) = ("\"map.parents\" = 1\n\"task.groups\" = [[0], [1]]", "\"map.parents\" = 2");
-        let runs = [run(1, a), run(1, b), run(2, a)];
-        let (keys, groups) = alike(&runs);
-        assert_eq!(keys, ["map.parents", "task.groups"]);
-        let labels: Vec<(&str, usize)> = groups.iter().map(|g| (g.label.as_str(), g.runs.len())).collect();
-        assert_eq!(labels, [("parents=1, 0|1", 2), ("parents=2", 1)]);
-        assert_eq!(groups[1].values, [Some("2".to_string()), None]);
-        let (keys, groups) = alike(&runs[..1]);
-        assert_eq!((keys.len(), groups[0].label.as_str()), (0, "toy"));
+    fn kinds_are_named_and_endings_say_the_format() {
+        for (kind, name) in Kind::ALL {
+            assert_eq!((name.parse::<Kind>(), kind.to_string()), (Ok(kind), name.to_string()));
+        }
+        assert!("pie".parse::<Kind>().unwrap_err().contains("spacetime"));
+        assert_eq!(endings(Some(Path::new("a.SVG"))).unwrap(), ["svg"]);
+        assert_eq!(endings(Some(Path::new("a"))).unwrap(), ["svg", "png"]);
+        assert_eq!(endings(Some(Path::new("a.pdf"))).unwrap_err().kind.exit_code(), 2);
+        assert_eq!(with_ending(Path::new("x/plot-a.b"), "svg"), Path::new("x/plot-a.b.svg"));
     }
 }

@@ -1,8 +1,8 @@
 //! `morphcog replay`: record a robot's rollout, for the pictures.
 
+use crate::analysis::dossier::check_length;
 use crate::base::error::Error;
 use crate::base::remedy::{Invocation, Remedy};
-use crate::base::text::counted;
 use crate::body::Body;
 use crate::config::{Config, DataConfig};
 use crate::data::dataset::Split;
@@ -21,9 +21,6 @@ use std::str::FromStr;
 
 /// Most images in one recording: pictures hold every frame.
 pub const MAX_IMAGES: usize = 20;
-
-/// Most places of points in a recording: some gigabyte.
-const MOST_PLACES: usize = 50_000_000;
 
 /// An image by split and index: `train:3`, `test:17`; without a word, a training image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -164,22 +161,6 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
     config.data.dataset = dataset.name().to_string();
     check_length(config, images.len())?;
     Ok(Subject { found, images })
-}
-
-/// Whether a simulation under this number of images can be recorded: a recording holds every point
-/// at every moment.
-pub(crate) fn check_length(config: &Config, images: usize) -> Result<(), Error> {
-    let points = (config.body.height + 1) * (config.body.width + 1);
-    let most = MOST_PLACES / points / images.max(1);
-    let steps = config.protocol.control_steps;
-    match steps as usize > most {
-        true => Err(Error::input(format!(
-            "protocol.control_steps = {steps}: expected at most {most} to record a rollout under {}",
-            counted(images, "image", "images")
-        ))
-        .advice("show fewer images")),
-        false => Ok(()),
-    }
 }
 
 /// Training images to show: all, or the first of each class if they are too many.

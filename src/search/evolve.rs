@@ -348,9 +348,8 @@ impl<'a> Run<'a> {
         let bodies: Vec<Body> = children.iter().map(simulated).collect();
         let thresholds = self.admission_thresholds();
         let children = children.iter().zip(&bodies);
-        let jobs: Vec<Job> = children
-            .map(|((_, parent, robot), body)| self.job(*parent, robot, body, &thresholds))
-            .collect();
+        let jobs: Vec<Job> =
+            children.map(|((_, parent, robot), body)| self.job(*parent, robot, body, &thresholds)).collect();
         let (physics, protocol) = (&config.physics, &config.protocol);
         let ranks = self.session.ranks;
         let sizes: Vec<u64> = jobs.iter().map(|job| job.body.counts().total as u64).collect();

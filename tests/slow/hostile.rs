@@ -14,7 +14,7 @@ use morphcog::base::session::Session;
 use morphcog::base::text::is_unseen;
 use morphcog::cli::explain::explain;
 use morphcog::cli::output::console::{Console, Mode};
-use morphcog::cli::output::figures::{self, Kind, Wanted};
+use morphcog::commands::plot::{self, Kind, Wanted};
 use morphcog::commands::simulate::{Scenario, simulate};
 use morphcog::commands::{eval, replay};
 use morphcog::config::Config;

@@ -2,7 +2,6 @@
 
 pub mod bar;
 pub mod console;
-pub mod figures;
 pub mod networks;
 pub mod pictures;
 pub mod player;

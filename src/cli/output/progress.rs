@@ -2,6 +2,7 @@
 
 use crate::base::number;
 use crate::base::observer::Generation;
+use crate::base::text::duration;
 
 /// Seconds after which the speed is measured anew, and how much must be done by then.
 const ANEW: (f64, u64) = (60.0, 10);
@@ -84,18 +85,6 @@ fn left(before: u64, done: u64, total: u64, seconds: f64) -> Option<String> {
     (did > 0 && todo > 0).then(|| format!("{} left", duration(seconds * todo as f64 / did as f64)))
 }
 
-/// Formats a time span in its two largest units: "45 s", "12 min 3 s", "3 h 20 min", "2 d 4 h".
-pub fn duration(seconds: f64) -> String {
-    let whole = if seconds.is_finite() { seconds.max(0.0).round() as u64 } else { 0 };
-    let (minutes, hours, days) = (whole / 60, whole / 3600, whole / 86400);
-    match (days, hours, minutes) {
-        (0, 0, 0) => format!("{whole} s"),
-        (0, 0, m) => format!("{m} min {} s", whole % 60),
-        (0, h, m) => format!("{h} h {} min", m % 60),
-        (d, h, _) => format!("{d} d {} h", h % 24),
-    }
-}
-
 /// Decides when a plain line is due where lines cannot be rewritten: the first at once, then every
 /// ten seconds or every tenth of the work, and the last.
 #[derive(Clone, Copy, Debug, Default)]
@@ -169,12 +158,6 @@ mod tests {
         let mut recent = Recent::new(0.0, 0);
         recent.shift(|done| *done += 980);
         assert_eq!(recent.since(2.0, 1000, |done| *done), (2.0, 980));
-    }
-
-    #[test]
-    fn durations_have_two_units_at_most() {
-        let spans = [0.4, 45.0, 723.0, 12_000.0, 187_200.0, f64::NAN].map(duration);
-        assert_eq!(spans, ["0 s", "45 s", "12 min 3 s", "3 h 20 min", "2 d 4 h", "0 s"]);
     }
 
     #[test]

@@ -1,14 +1,14 @@
 //! The results of `sweep` and `reproduce`.
 
+use crate::analysis::progress::alike;
+use crate::analysis::sweep::{Collected, Columns, Row, csv};
 use crate::base::error::Error;
 use crate::base::files::write_atomically;
 use crate::base::number;
 use crate::base::number::percent;
 use crate::base::text::counted;
+use crate::base::text::duration;
 use crate::cli::output::console::{Console, Mode};
-use crate::cli::output::progress::duration;
-use crate::commands::collect::{Collected, Columns, Row, csv};
-use crate::commands::plot::alike;
 use crate::commands::tasks::Status;
 use crate::draw::error::write_whole;
 use crate::draw::plot;
@@ -155,14 +155,14 @@ fn table(console: &Console, rows: &[Row]) {
 }
 
 /// Writes the keys in which runs differ, a line per group that differs only in the seed.
-pub fn differences(console: &Console, runs: &[crate::commands::plot::Progress]) {
+pub fn differences(console: &Console, runs: &[crate::analysis::progress::Progress]) {
     let (keys, groups) = alike(runs);
     if groups.len() < 2 || console.mode() != Mode::Human {
         return;
     }
     console.line("");
     let headers: Vec<&str> = ["line", "runs"].into_iter().chain(keys.iter().map(String::as_str)).collect();
-    let row = |(number, group): (usize, &crate::commands::plot::Group)| {
+    let row = |(number, group): (usize, &crate::analysis::progress::Group)| {
         let values = group.values.iter().map(|value| value.clone().unwrap_or("–".to_string()));
         [number.to_string(), group.runs.len().to_string()].into_iter().chain(values).collect::<Vec<_>>()
     };

@@ -1,6 +1,6 @@
 //! The figure of a run's progress: QD score, coverage and best fitness over evaluations.
 
-use crate::commands::plot::{Group, Progress, alike};
+use crate::analysis::progress::{Group, Progress, alike};
 use crate::draw::colour;
 use crate::draw::colour::Colour;
 use crate::draw::plot::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};

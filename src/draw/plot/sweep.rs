@@ -1,6 +1,6 @@
 //! The figure of a sweep: accuracy by the varied settings, a dot per seed.
 
-use crate::commands::collect::Row;
+use crate::analysis::sweep::Row;
 use crate::draw::colour;
 use crate::draw::plot::axes::{AXIS, Axis, MARGIN, Plot, heading};
 use crate::draw::plot::canvas::{Canvas, Pen, TEXT, Words};

@@ -1,9 +1,9 @@
 //! Robots as buttons; a click plays them.
 
+use crate::analysis::dossier::Dossier;
 use crate::base::number;
 use crate::base::remedy::Invocation;
 use crate::body::{Body, Material};
-use crate::commands::report::Dossier;
 use crate::draw::colour::{MARK_WIDTH, mark, mark_colour, placed};
 use crate::draw::html::escape;
 use crate::draw::plot::canvas::Piece;

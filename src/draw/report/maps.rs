@@ -1,7 +1,7 @@
 //! The archive as buttons, and the rollouts that they play.
 
+use crate::analysis::dossier::{Dossier, Gathered};
 use crate::base::threads::in_pool;
-use crate::commands::report::{Dossier, Gathered};
 use crate::draw::error::PictureError;
 use crate::draw::html::{escape, packed};
 use crate::draw::plot::{below, sequential};

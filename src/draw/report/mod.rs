@@ -8,8 +8,8 @@ pub(crate) mod tables;
 mod team;
 mod words;
 
+use crate::analysis::dossier::{Dossier, Findings, Gathered};
 use crate::base::remedy::Invocation;
-use crate::commands::report::{Dossier, Findings, Gathered};
 use crate::draw::error::PictureError;
 use crate::draw::html::{escape, fill};
 use crate::draw::plot::Figure;

@@ -1,12 +1,12 @@
 //! The tables of a report.
 
+use crate::analysis::dossier::{Dossier, Findings};
 use crate::analysis::published;
 use crate::base::number;
 use crate::base::number::percent;
 use crate::base::text::counted;
+use crate::base::text::duration;
 use crate::baseline::curve::Crossing;
-use crate::cli::output::progress::duration;
-use crate::commands::report::{Dossier, Findings};
 use crate::draw::html::escape;
 use crate::draw::report::words;
 use crate::sim::InstructionSet;

@@ -1,9 +1,9 @@
 //! The team of a report: its answers, and a few images under which all robots walk on small stages.
 
+use crate::analysis::dossier::{Dossier, Team};
 use crate::analysis::votes::Tally;
 use crate::base::Grid;
 use crate::base::threads::in_pool;
-use crate::commands::report::{Dossier, Team};
 use crate::draw::error::PictureError;
 use crate::draw::html::{corners, escape, materials, pack};
 use crate::draw::plot;

@@ -1,11 +1,11 @@
 //! The words of a report: its title, a methods paragraph, and the commands that reproduce it.
 
+use crate::analysis::dossier::Dossier;
 use crate::base::hash::short;
 use crate::base::number;
 use crate::base::number::percent;
 use crate::base::remedy::{Invocation, Value};
 use crate::base::shell::in_shell;
-use crate::commands::report::Dossier;
 use crate::config::capacity::CapacityConfig;
 use crate::config::train::TrainConfig;
 use crate::config::{Config, Settings, flatten};

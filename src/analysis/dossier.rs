@@ -1,9 +1,9 @@
 //! `morphcog report`: gathers what is known of runs, for a page.
 
+use crate::analysis::progress::Progress;
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
-use crate::commands::plot::Progress;
-use crate::commands::replay;
+use crate::base::text::counted;
 use crate::config::Config;
 use crate::data::dataset::Split;
 use crate::images::whereabouts::{Whereabouts, load_dataset_of, see};
@@ -21,6 +21,9 @@ use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::recording::{Recording, Seen};
 use crate::task::rollout::record;
 use std::path::{Path, PathBuf};
+
+/// Most places of points in a recording: some gigabyte.
+const MOST_PLACES: usize = 50_000_000;
 
 /// Most images in the rollouts of a page: one of each class, if there are more.
 const MOST_IMAGES: usize = 4;
@@ -237,7 +240,7 @@ fn images(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Vec<S
             is_first
         });
     }
-    replay::check_length(&run.config, shown.len()).map_err(without)?;
+    check_length(&run.config, shown.len()).map_err(without)?;
     let one = |image: &ImageRef| {
         let label = format!("{} (train {})", image.label, image.index);
         let seen = see(&run.config, &dataset, Split::Train, image.index);
@@ -246,6 +249,22 @@ fn images(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Vec<S
         Ok(Seen { class: image.label, label, stimulus: seen? })
     };
     shown.iter().map(one).collect()
+}
+
+/// Whether a simulation under this number of images can be recorded: a recording holds every point
+/// at every moment.
+pub(crate) fn check_length(config: &Config, images: usize) -> Result<(), Error> {
+    let points = (config.body.height + 1) * (config.body.width + 1);
+    let most = MOST_PLACES / points / images.max(1);
+    let steps = config.protocol.control_steps;
+    match steps as usize > most {
+        true => Err(Error::input(format!(
+            "protocol.control_steps = {steps}: expected at most {most} to record a rollout under {}",
+            counted(images, "image", "images")
+        ))
+        .advice("show fewer images")),
+        false => Ok(()),
+    }
 }
 
 impl Dossier {
