@@ -6,27 +6,26 @@
 //!
 //! # The layers
 //!
-//! A module uses only modules of lower layers. Below all of them is a crate of its own, the
-//! simulator: [`sim`] (`morphcog-sim`), the physics and nothing else. Begin there with
-//! [`sim::World`].
+//! A module uses only modules of lower layers. Below them all is the simulator, [`sim`], a crate of
+//! its own (`morphcog-sim`) for the physics alone. Begin there with [`sim::World`].
 //!
-//! | layer | module | what is in it | begin with |
+//! | layer | module | contents | begin with |
 //! |---|---|---|---|
-//! | 0 | [`base`] | random streams, hashes, whole-file writes, errors, observers, tables | [`base::error::Error`] |
-//! | 1 | [`body`] | bodies, which are the simulator's, and what they are known by | [`body::Body`] |
+//! | 0 | [`base`] | random streams, hashes, file writes, errors, tables | [`base::error::Error`] |
+//! | 1 | [`body`] | the simulator's bodies and their identities | [`body::Body`] |
 //! | 2 | [`genome`] | CPPNs and their mutations | [`genome::Genome`] |
 //! | 2 | [`qd`] | archives and MAP-Elites over any type of solution | [`qd::MapElites`] |
 //! | 2 | [`baseline`] | networks that robots are compared with | [`baseline::train`] |
-//! | 2 | [`data`] | the IDX reader, where datasets lie and come from, drawn digits | [`data::dataset::Dataset`] |
-//! | 3 | [`task`] | stimuli, protocols, rollouts, scores, responses and teaching | [`task::evaluation`] |
-//! | 4 | [`config`] | everything a run depends on, with line and key of what is wrong | [`config::Config`] |
-//! | 5 | [`store`] | every file of a run's folder as plain data; which robots are meant | [`store::run::RunFile`] |
-//! | 6 | [`search`] | evolution, training, choice on validation images | [`search::evolve`] |
-//! | 7 | [`analysis`] | responses, verdicts, the published robots and numbers | [`analysis::measure`] |
-//! | 8 | [`commands`] | what the commands do, one file a command: options in, result out | [`commands::eval`] |
-//! | 9 | [`view`] | pictures, figures, reports | [`view::Walk`] |
-//! | 10 | [`serve`] | the page on which one draws a digit, over HTTP | [`serve::Service`] |
-//! | 11 | [`cli`] | the command line, and what it shows on a terminal | [`cli::Cli`] |
+//! | 2 | [`data`] | the IDX reader, datasets, drawn digits | [`data::dataset::Dataset`] |
+//! | 3 | [`task`] | stimuli, protocols, rollouts, scores | [`task::evaluation`] |
+//! | 4 | [`config`] | everything a run depends on; errors with line and key | [`config::Config`] |
+//! | 5 | [`store`] | the files of a run's folder as plain data | [`store::run::RunFile`] |
+//! | 6 | [`search`] | evolution and the choice of robots by validation | [`search::evolve`] |
+//! | 7 | [`analysis`] | verdicts, votes, the paper's numbers | [`analysis::verdict`] |
+//! | 8 | [`commands`] | one file per command: options in, result out | [`commands::eval`] |
+//! | 9 | [`draw`] | pictures, figures, reports | [`draw::Walk`] |
+//! | 10 | [`serve`] | the page on which the user draws digits, over HTTP | [`serve::Service`] |
+//! | 11 | [`cli`] | the command line and its output | [`cli::Cli`] |
 //!
 //! # A rollout
 //!
@@ -48,7 +47,7 @@
 //! ```
 
 #![forbid(unsafe_code)]
-// In tests all of this may be.
+// Tests may use all of these.
 #![cfg_attr(
     not(test),
     deny(

@@ -1,4 +1,4 @@
-//! Honest neighbours of a robot's accuracy: what takes no body at all.
+//! Simple classifiers without a body, to compare a robot's accuracy with.
 
 use crate::base::Grid;
 use crate::baseline::nearest::nearest;
@@ -13,7 +13,7 @@ pub struct Labelled<'a> {
     pub class: u8,
 }
 
-/// One pixel and a threshold: above it one group, else the other.
+/// A classifier by one pixel: above its threshold one group, else the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelRule {
     /// Its row.
@@ -26,14 +26,14 @@ pub struct PixelRule {
     pub above: Group,
 }
 
-/// Share of the images that are of the larger group: the accuracy of always giving that answer.
+/// Returns the accuracy of always answering with the larger group.
 pub fn larger_group(split: &Split, images: &[Labelled]) -> f64 {
     let a = images.iter().filter(|image| split.group(image.class) == Some(Group::A)).count();
     a.max(images.len() - a) as f64 / images.len().max(1) as f64
 }
 
-/// The pixel and threshold that tell the groups of some images apart best (the first in reading
-/// order wins a tie); `None` without images.
+/// Returns the pixel and threshold that best separate the groups; the first in reading order wins a
+/// tie. Returns `None` without images.
 pub fn best_pixel(split: &Split, images: &[Labelled]) -> Option<PixelRule> {
     let first = images.first()?.stimulus;
     let total_a = images.iter().filter(|image| split.group(image.class) == Some(Group::A)).count();
@@ -44,8 +44,7 @@ pub fn best_pixel(split: &Split, images: &[Labelled]) -> Option<PixelRule> {
             let mut sorted: Vec<(f64, bool)> =
                 images.iter().map(|i| (value(i), split.group(i.class) == Some(Group::A))).collect();
             sorted.sort_by(|x, y| x.0.total_cmp(&y.0));
-            // Below a threshold after i images: right if A is the answer below, B above; or the
-            // other way round.
+            // With the threshold after i images, A may be the answer below it, or B.
             let mut a_below = 0;
             for (i, (level, is_a)) in sorted.iter().enumerate() {
                 a_below += usize::from(*is_a);
@@ -68,7 +67,7 @@ pub fn best_pixel(split: &Split, images: &[Labelled]) -> Option<PixelRule> {
 }
 
 impl PixelRule {
-    /// Share of images it answers correctly.
+    /// Returns the fraction of images it answers correctly.
     pub fn accuracy(&self, split: &Split, images: &[Labelled]) -> f64 {
         let answer = |image: &Labelled| {
             let value = image.stimulus.or_default((self.row, self.column));
@@ -78,7 +77,7 @@ impl PixelRule {
     }
 }
 
-/// Accuracy of answering with the group of the [`nearest`] training image.
+/// Returns the accuracy of answering with the group of the [`nearest`] training image.
 pub fn nearest_training_image(split: &Split, training: &[Labelled], images: &[Labelled]) -> f64 {
     let known = || training.iter().filter_map(|other| Some((other.stimulus, split.group(other.class)?)));
     share(images, |image| {
@@ -118,7 +117,7 @@ mod tests {
         assert_eq!(rule.accuracy(split, &images[2..]), 1.0);
         assert_eq!(larger_group(split, &images[1..]), 2.0 / 3.0);
         assert_eq!(nearest_training_image(split, &images[..3], &images), 0.75);
-        // One image, seen as a zero once and as others twice.
+        // The same image, labelled once as a zero and twice as others.
         let same = |class: u8| Labelled { class, ..images[0] };
         let known = [same(0), same(1), same(2)];
         assert_eq!(nearest_training_image(split, &known, &[same(1)]), 1.0);

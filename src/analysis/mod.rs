@@ -1,5 +1,4 @@
-//! Analysis of tested robots: verdicts of audits, votes of a team, simple classifiers, and the
-//! paper's own numbers.
+//! Analysis of robots: audit verdicts, team votes, simple classifiers, and the paper's numbers.
 
 pub mod baselines;
 pub mod dossier;

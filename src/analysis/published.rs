@@ -1,4 +1,4 @@
-//! What the paper published, for standing beside our own figures.
+//! The paper's published results, for comparison with ours.
 
 /// A row of the paper's table.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -7,10 +7,9 @@ pub struct PaperRow {
     pub task: &'static str,
     /// Mean accuracy of ten robots on held-out images \[%\] (section "Generalization test").
     pub accuracy: f64,
-    /// Hidden neurons of the network they are worth; none: no match (section "Morphological
-    /// cognition capacity").
+    /// Hidden neurons of the equivalent network, if any ("Morphological cognition capacity").
     pub mlp: Option<f64>,
-    /// Kernels of the convolutional one.
+    /// Kernels of the equivalent convolutional network.
     pub cnn: Option<f64>,
 }
 
@@ -26,7 +25,7 @@ pub const PAPER: [PaperRow; 8] = [
     PaperRow { task: "03|12", accuracy: 57.14, mlp: None, cnn: Some(13.7) },
 ];
 
-/// The paper's row of a task on a dataset; there are rows of MNIST only.
+/// Returns the paper's row of a task; there are rows for MNIST only.
 pub fn row(dataset: &str, task: &str) -> Option<&'static PaperRow> {
     PAPER.iter().find(|row| dataset == "mnist" && row.task == task)
 }

@@ -1,4 +1,4 @@
-//! [`Verdict`]: what an audit makes of a robot's perturbed rollouts, and by which [`Criteria`].
+//! [`Verdict`]: the conclusion of an audit from perturbed rollouts, according to its [`Criteria`].
 
 use crate::base::number;
 use crate::config::audit::Criteria;
@@ -12,22 +12,21 @@ use crate::task::score::Answer;
 /// Balanced accuracy of a robot that always walks the same way.
 const CHANCE: f64 = 0.5;
 
-/// How a robot is to walk, and how it does in its own simulator.
+/// A robot's correct directions, and its answers in its own simulator.
 pub(crate) struct Behaviour<'a> {
     criteria: &'a Criteria,
-    /// Displacements in the unchanged rollout.
+    /// Displacements in the unperturbed rollout.
     plain: Vec<f64>,
-    /// For each image whether its class is to walk right; none if it is in no group.
+    /// True for images whose class is to walk right; `None` if it is in no group.
     rightward: Vec<Option<bool>>,
     /// Images answered correctly.
     answered: Vec<usize>,
-    /// Why it is no walker, if it is none.
+    /// Reason why it is no walker; `None` if it is one.
     flaw: Option<String>,
 }
 
 impl<'a> Behaviour<'a> {
-    /// Of a robot that performs a task, judged by some fitness, and answers these classes with
-    /// these displacements.
+    /// Evaluates a robot's unperturbed displacements on its task, under images of these classes.
     pub fn new(
         criteria: &'a Criteria,
         (split, fitness): (&Split, Fitness),
@@ -43,8 +42,8 @@ impl<'a> Behaviour<'a> {
         let asked: Vec<usize> = (0..plain.len()).filter(|&image| rightward[image].is_some()).collect();
         let is_right = |&image: &usize| towards(rightward[image], plain[image]) > criteria.threshold;
         let answered: Vec<usize> = asked.iter().copied().filter(is_right).collect();
-        // Who is wrong on many is a walker all the same, if it walks: how much it knows is for a
-        // test to say.
+        // A robot with many wrong answers is still a walker if it walks; tests measure its
+        // accuracy.
         let walks = |&&image: &&usize| Direction::of(plain[image], criteria.threshold).is_some();
         let walked = asked.iter().filter(walks).count();
         let groups = [Group::A, Group::B].into_iter().filter(|&group| !split.classes(group).is_empty());
@@ -73,12 +72,12 @@ impl<'a> Behaviour<'a> {
         Behaviour { criteria, plain, rightward, answered, flaw }
     }
 
-    /// Whether there is anything to audit.
+    /// Returns true if the robot can be audited.
     pub fn is_walker(&self) -> bool {
         self.flaw.is_none()
     }
 
-    /// Compares a perturbed rollout with the unchanged one.
+    /// Compares a perturbed rollout with the unperturbed one.
     pub fn compare(&self, name: String, kind: Kind, displacements: Option<Vec<f64>>) -> PerturbedRollout {
         let along = |of: &[f64], image: usize| towards(self.rightward[image], of[image]);
         let (mut kept, mut distance) = (0.0, 0.0);
@@ -93,7 +92,7 @@ impl<'a> Behaviour<'a> {
         PerturbedRollout { name, kind, displacements, kept, distance, persists }
     }
 
-    /// Verdict and reason.
+    /// Returns the verdict and its reason.
     pub fn judge(&self, rollouts: &[PerturbedRollout]) -> (Verdict, String) {
         if let Some(flaw) = &self.flaw {
             return (Verdict::NotAWalker, flaw.clone());
@@ -119,18 +118,18 @@ impl<'a> Behaviour<'a> {
         (Verdict::Fragile, broken.join(", "))
     }
 
-    /// Root mean square difference of the perturbed rollouts' displacements from the unchanged
-    /// ones, voxel lengths; unstable rollouts have none.
+    /// Returns the root mean square difference of displacements between perturbed and unperturbed
+    /// rollouts \[voxel lengths\]; unstable rollouts are left out.
     pub fn spread(&self, rollouts: &[PerturbedRollout]) -> f64 {
         let stable = rollouts.iter().filter_map(|rollout| rollout.displacements.as_ref());
         let squares: Vec<f64> =
             stable.flat_map(|d| d.iter().zip(&self.plain).map(|(a, b)| (a - b) * (a - b))).collect();
-        // + 0.0: the sum of nothing is −0.
+        // The sum of no terms is −0; adding 0.0 makes it 0.
         ((squares.iter().sum::<f64>() + 0.0) / squares.len().max(1) as f64).sqrt()
     }
 }
 
-/// How far a displacement leads in the correct direction.
+/// Returns the displacement in the correct direction.
 fn towards(rightward: Option<bool>, displacement: f64) -> f64 {
     match rightward {
         Some(true) => displacement,
@@ -181,7 +180,7 @@ mod tests {
         let behaviour = Behaviour::new(&criteria, (&split, Fitness::Min), &[0, 1], vec![-10.0, 12.0]);
         let compare = |d: Option<[f64; 2]>| behaviour.compare("x".into(), Kind::Start, d.map(Vec::from));
         assert!(compare(Some([-9.0, 30.0])).persists);
-        // Just below the threshold that makes an answer.
+        // Below the threshold for an answer.
         assert!(compare(Some([-9.0, 2.9])).persists && !compare(Some([-9.0, 1.5])).persists);
         let turned = compare(Some([9.0, 30.0]));
         assert_eq!((turned.kept, turned.persists), (0.5, false));
@@ -203,7 +202,7 @@ mod tests {
         assert_eq!(flaw([5.0, -4.0, -9.0, -2.0]), None);
         assert_eq!(flaw([5.0, -4.0, -1.0, -2.0]).unwrap(), "answers 2 of 4 training images");
         assert!(flaw([2.0, -4.0, -9.0, -8.0]).is_some_and(|flaw| flaw.ends_with("the correct way for 0")));
-        // Knowing little is no flaw of a walk, knowing nothing is.
+        // A low accuracy is no flaw of a walker, but accuracy at chance is.
         assert_eq!(flaw([9.0, -8.0, 4.0, 4.0]), None);
         let flaw = |d: &[f64], classes: &[u8]| {
             Behaviour::new(&criteria, (split, Fitness::MeanClipped), classes, d.to_vec()).flaw

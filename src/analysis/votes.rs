@@ -1,5 +1,4 @@
-//! How robots that tell two groups of classes apart answer together which class an image is of,
-//! without any trained weight.
+//! Combines robots for two groups of classes into one classifier, without trained weights.
 
 use crate::base::error::Error;
 use crate::base::ranges;
@@ -8,23 +7,23 @@ use crate::task::judge::Judge;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Walks count up to this far in a sum of walks \[voxel lengths\].
+/// Largest displacement that counts in a sum of walks \[voxel lengths\].
 pub const CLIP: f64 = 10.0;
 
-/// What all walks under one image come to, for every class.
+/// The votes and sums of walks under one image, for every class.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Ballot {
-    /// Votes: one of each robot for every class of the side it walked to.
+    /// Votes: each robot has one for every class of the side it walked to.
     pub votes: Vec<usize>,
-    /// Sums of walks \[voxel lengths\]: towards a class's side positive, away from it negative.
+    /// Sums of walks \[voxel lengths\]: positive towards a class's side, negative away from it.
     pub sums: Vec<f64>,
-    /// Robots that gave no vote.
+    /// Number of robots that gave no vote.
     pub silent: usize,
 }
 
 impl Ballot {
-    /// Counts walks, one of each robot; `None` is that of an unstable simulation, which says
-    /// nothing. A walk of at most `threshold` gives no vote; one longer than `clip` counts as `clip`.
+    /// Counts one walk of each robot; `None` is an unstable one, without effect. A walk of at most
+    /// `threshold` gives no vote; one longer than `clip` counts as `clip`.
     pub fn count<'a>(
         classes: &[u8],
         walks: impl IntoIterator<Item = (&'a Judge, Option<f64>)>,
@@ -51,15 +50,15 @@ impl Ballot {
         ballot
     }
 
-    /// The place of the class with most votes, and whether several have as many: then the largest
-    /// sum of walks among them wins, then the first.
+    /// Returns the index of the class with most votes, and true if several tie. Among those the
+    /// largest sum of walks wins, then the first.
     pub fn by_votes(&self) -> (usize, bool) {
         let most = self.votes.iter().copied().max().unwrap_or(0);
         let among = || (0..self.votes.len()).filter(|place| self.votes[*place] == most);
         (self.largest(among()), among().count() > 1)
     }
 
-    /// The place of the class with the largest sum of walks, the first of several.
+    /// Returns the index of the class with the largest sum of walks; the first wins a tie.
     pub fn by_walks(&self) -> usize {
         self.largest(0..self.sums.len())
     }
@@ -75,20 +74,20 @@ impl Ballot {
     }
 }
 
-/// What the walks of a team come to under one image, at their end or before.
+/// The walks of a team under one image and their counts, at the end or before.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Tally {
-    /// How far each robot has walked \[voxel lengths\]; none of one that has become unstable.
+    /// Displacement of each robot so far \[voxel lengths\]; `None` if it became unstable.
     pub moved: Vec<Option<f64>>,
     /// Votes and sums of walks, for every class.
     #[serde(flatten)]
     pub ballot: Ballot,
-    /// The class with most votes; none while there is no vote.
+    /// The class with most votes; `None` while there is no vote.
     pub says: Option<u8>,
 }
 
 impl Tally {
-    /// Of walks, each with what it says; threshold and clip as of [`Ballot::count`].
+    /// Counts walks; threshold and clip are those of [`Ballot::count`].
     pub fn of(
         classes: &[u8],
         judges: &[&Judge],
@@ -103,12 +102,12 @@ impl Tally {
     }
 }
 
-/// How many answers are correct.
+/// The accuracy on some images.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Accuracy {
     /// Images answered correctly.
     pub right: usize,
-    /// Share answered correctly.
+    /// Fraction answered correctly.
     #[serde(deserialize_with = "ranges::share")]
     pub accuracy: f64,
     /// Its 95 % Wilson interval.
@@ -117,10 +116,10 @@ pub struct Accuracy {
 }
 
 impl Accuracy {
-    /// Checks that it is about at most so many images.
+    /// Checks that it covers at most this many images.
     ///
     /// # Errors
-    /// If more are right; the error names the key.
+    /// If more are correct, the error names the key.
     pub(crate) fn check(&self, images: usize) -> Result<(), Error> {
         match self.right <= images {
             true => Ok(()),
@@ -128,7 +127,7 @@ impl Accuracy {
         }
     }
 
-    /// Of answers, each with what would be correct.
+    /// Computes the accuracy from pairs of an answer and the correct one.
     pub fn of<T: PartialEq>(answers: impl IntoIterator<Item = (T, T)>) -> Self {
         let (mut right, mut all) = (0, 0);
         for (answer, expected) in answers {
@@ -171,10 +170,10 @@ mod tests {
     #[test]
     fn a_tie_goes_to_the_larger_sum_of_walks_among_the_tied_and_then_to_the_lower_class() {
         let (a, b) = (sides(&[0], &[1]), sides(&[2], &[1]));
-        // One vote for 0, one for 2; 2 is walked to farther.
+        // One vote each for 0 and 2; the walk towards 2 is longer.
         assert_eq!(count(&[(&a, Some(-4.0)), (&b, Some(-6.0))]).by_votes(), (2, true));
         assert_eq!(count(&[(&a, Some(-4.0)), (&b, Some(-4.0))]).by_votes(), (0, true));
-        // Nobody votes: all are tied, and sums decide.
+        // Without votes all classes tie, and sums decide.
         assert_eq!(count(&[(&a, Some(2.0)), (&b, Some(1.0))]).by_votes(), (1, true));
         assert_eq!(count(&[]).by_votes(), (0, true));
     }

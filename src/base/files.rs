@@ -10,14 +10,14 @@ use std::time::{Duration, SystemTime};
 /// Prefix and suffix of the names of temporary files, around the name of the file to be written.
 const TEMPORARY: [&str; 2] = [".", ".tmp"];
 
-/// Time after which a writer surely has its temporary file locked.
+/// Age from which a temporary file is sure to be locked if its writer is alive.
 const TO_LOCK: Duration = Duration::from_secs(10);
 
-/// Most bytes of a text: many times the size of any file of ours.
+/// Most bytes of a text; far above the size of any file of ours.
 const MOST_TEXT: u64 = 256 << 20;
 
-/// Opens a file of a run or a dataset, where anybody can put one. A pipe, a socket or a device is
-/// refused at once, because opening or reading it could block for ever. (A folder fails when read.)
+/// Opens a file of a run or a dataset. Refuses a pipe, a socket or a device at once: anybody can
+/// put one there, and it could block for ever. (A folder fails when read.)
 ///
 /// # Errors
 /// Returns the system's error, or one that names the kind if it is no regular file.
@@ -33,7 +33,7 @@ pub fn open_file(path: &Path) -> io::Result<File> {
         options.custom_flags(flags.bits().cast_signed());
     }
     let file = options.open(path)?;
-    // Checks the open file, so that nothing can replace it in between.
+    // The open file is checked, so that nothing can replace it in between.
     regular(&file.metadata()?)?;
     Ok(file)
 }
@@ -67,7 +67,7 @@ pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Reads a text.
+/// Reads a text file of a run or a dataset.
 ///
 /// # Errors
 /// As [`open_file`] and [`read_limited`].
@@ -87,11 +87,10 @@ pub fn read_given(path: &Path) -> io::Result<String> {
     }
 }
 
-/// Reads a text to its end: UTF-8, or UTF-16 that begins with its byte order mark, as PowerShell's
-/// `>` writes it.
+/// Reads a text to its end: UTF-8, or UTF-16 with a byte order mark, as PowerShell's `>` writes it.
 ///
 /// # Errors
-/// Returns the system's error, or one of its own if it is no such text or above 256 megabytes.
+/// Returns the system's error, or its own if it is no such text or exceeds 256 megabytes.
 pub fn read_limited(source: impl Read) -> io::Result<String> {
     let mut bytes = Vec::new();
     let read = source.take(MOST_TEXT + 1).read_to_end(&mut bytes)?;
@@ -112,8 +111,7 @@ fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Option<String> {
     text.filter(|_| rest.is_empty())
 }
 
-/// Replaces a leading `~` by the user's home folder, as shells do: in files and `--option=~/…` no
-/// shell does.
+/// Replaces a leading `~` by the user's home folder; in files and `--option=~/…` no shell does.
 pub fn home_expanded(path: &Path) -> PathBuf {
     match (path.strip_prefix("~"), std::env::home_dir()) {
         (Ok(below), Some(home)) if !home.as_os_str().is_empty() => home.join(below),
@@ -146,7 +144,7 @@ pub fn write_whole(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>)
     let path = &led_to(asked);
     let folder = folder_of(path);
     let mut file = temporary(path)?;
-    // Tells others that the writer lives; where the file system has no locks, nothing does.
+    // The lock tells others that the writer lives, if the file system has locks.
     let _ = file.as_file().try_lock();
     write(file.as_file_mut())?;
     file.as_file().sync_all()?;
@@ -179,8 +177,7 @@ fn temporary_of(name: &str) -> Option<&str> {
     inner.rsplit_once('.').map(|(name, _)| name)
 }
 
-/// Removes the temporary files of a file whose writers were killed. Ignores failures: the file
-/// itself is already written.
+/// Removes temporary files of killed writers. Ignores failures: the file itself is written.
 fn remove_left_behind(path: &Path) {
     let own = inner_name(path).to_string_lossy();
     let Ok(entries) = std::fs::read_dir(folder_of(path)) else { return };
@@ -192,12 +189,12 @@ fn remove_left_behind(path: &Path) {
     }
 }
 
-/// Returns true if the writer of a temporary file has ended: otherwise it would hold its lock. A
-/// writer that has only just made the file may not have locked it yet.
+/// Returns true if the writer of a temporary file has ended, since a live one holds its lock. A new
+/// file may not be locked yet.
 fn is_left_behind(entry: &DirEntry) -> io::Result<bool> {
     let found = entry.metadata()?;
     let age = SystemTime::now().duration_since(found.modified()?).unwrap_or_default();
-    // Only files can be leftovers; and network file systems lock only what is open for writing.
+    // Only files can be leftovers, and network file systems lock only files open for writing.
     let opened = || File::options().write(true).open(entry.path());
     Ok(found.is_file() && age > TO_LOCK && opened()?.try_lock().is_ok())
 }

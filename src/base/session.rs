@@ -1,4 +1,4 @@
-//! [`Session`]: with what a command works, made once and passed by reference.
+//! [`Session`]: the resources of a command, made once and passed by reference.
 
 use crate::base::error::Error;
 use crate::base::observer::Observer;
@@ -9,24 +9,23 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
-/// The threads and processes that a command works with, how it is stopped, who watches it, and
-/// where the user says that the images are.
+/// The threads and processes of a command, its stop flag, its observer, and the images' folder.
 pub struct Session<'a> {
     /// Number of threads; `None`: one per core. Results do not depend on it.
     pub threads: Option<usize>,
-    /// The processes that do the work together, each with the same options.
+    /// Processes that share the work, each with the same options.
     pub ranks: Ranks,
-    /// Set from another thread or by a signal, it stops the command: what is finished is kept.
+    /// Stops the command when set, by another thread or a signal; finished work is kept.
     pub stop: &'a AtomicBool,
-    /// Progress, warnings and findings go here; nothing else is ever printed.
+    /// Receives progress, warnings and findings; nothing else is ever printed.
     pub observer: &'a dyn Observer,
-    /// The folder with the images, if the user names one.
+    /// Folder of the images, if the user names one.
     pub data: Option<PathBuf>,
     pool: OnceLock<rayon::ThreadPool>,
 }
 
 impl Default for Session<'_> {
-    /// One thread per core, one process, no observer; never stopped.
+    /// Returns a session with one thread per core, one process and no observer; it never stops.
     fn default() -> Self {
         Session::new(&NEVER, &())
     }
@@ -51,13 +50,13 @@ impl<'a> Session<'a> {
         Session { ranks, ..self }
     }
 
-    /// Returns a session with the folder of the images that the user names.
+    /// Returns a session with the images' folder that the user names.
     #[must_use]
     pub fn data(self, data: Option<PathBuf>) -> Self {
         Session { data, ..self }
     }
 
-    /// Returns a session that differs in its observer.
+    /// Returns a session with another observer.
     pub fn watched<'b>(&self, observer: &'b dyn Observer) -> Session<'b>
     where
         'a: 'b,
@@ -65,15 +64,15 @@ impl<'a> Session<'a> {
         Session::new(self.stop, observer).threads(self.threads).ranks(self.ranks).data(self.data.clone())
     }
 
-    /// Returns the folder of the images that the user names.
+    /// Returns the images' folder that the user names.
     pub fn folder(&self) -> Option<&Path> {
         self.data.as_deref()
     }
 
-    /// Returns the threads, which are started when they are first asked for.
+    /// Returns the pool of threads, which starts at the first call.
     ///
     /// # Errors
-    /// If the system has none left.
+    /// Returns an error if the system cannot start the threads.
     pub fn pool(&self) -> Result<&rayon::ThreadPool, Error> {
         if let Some(pool) = self.pool.get() {
             return Ok(pool);
@@ -85,7 +84,7 @@ impl<'a> Session<'a> {
     /// Checks that the session has not been stopped.
     ///
     /// # Errors
-    /// If it has.
+    /// Returns [`Stopped`] if it has.
     pub fn check(&self) -> Result<(), Stopped> {
         check(self.stop)
     }

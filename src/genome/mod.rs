@@ -45,17 +45,17 @@ pub struct BodySpec {
     pub min_muscles: usize,
 }
 
-/// Most mutations in a row without a valid body. (On 14 × 14 voxels a random individual needs some
-/// 25 from scratch, seldom above 150; an offspring two or three.)
+/// Most mutations in a row without a valid body. (On 14 × 14 voxels a random individual needs about
+/// 25, seldom above 150; an offspring two or three.)
 pub const MAX_MUTATIONS: usize = 100_000;
 
 /// Mutations between two checks for a stop.
 const MUTATIONS_AT_ONCE: usize = 200;
 
-/// The reason why there is no valid body.
+/// The reason for the lack of a valid body.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum GenomeError {
-    /// Mutation never gave a valid body.
+    /// No mutation gave a valid body.
     #[error(
         "no valid body after {mutations} mutations; expected a connected body of at most {height} × {width} \
          voxels with at least {min_muscles} muscles: make it larger or ask for fewer muscles"
@@ -73,7 +73,7 @@ pub enum GenomeError {
     /// The size is impossible for a body.
     #[error(transparent)]
     Size(#[from] BodyError),
-    /// The search was stopped before there was one.
+    /// The search was stopped before it found one.
     #[error(transparent)]
     Stopped(#[from] Stopped),
 }
@@ -108,7 +108,7 @@ impl Genome {
         if self.edits.is_empty() { Ok(described) } else { Body::new(self.edits.apply(&described)) }
     }
 
-    /// Returns a copy with this body: voxels that differ from the network's are edited.
+    /// Returns a copy with this body; voxels that differ from the network's become edits.
     ///
     /// # Errors
     /// Returns a [`BodyError`] if the size is impossible for a body.
@@ -121,9 +121,9 @@ impl Genome {
         Ok(Genome { cppn: self.cppn.clone(), edits })
     }
 
-    /// Returns a short id, the same for the same genome: the first ten hexadecimal digits of its
-    /// [digest](Genome::digest). The first is a letter: `g` to `p` stand for 0 to 9, since tools
-    /// take `0636890406` and `18e2354970` for numbers.
+    /// Returns a short id, equal for equal genomes: ten hexadecimal digits of its
+    /// [digest](Genome::digest). The first becomes a letter (`g` to `p` for 0 to 9), since tools
+    /// read `18e2354970` as a number.
     pub fn id(&self) -> String {
         let mut id = self.digest()[..10].to_string();
         if let Ok(digit) = id[..1].parse::<u8>() {
@@ -132,8 +132,7 @@ impl Genome {
         id
     }
 
-    /// Returns true if an id is this genome's, now or in older files, where it may begin with a
-    /// digit.
+    /// Returns true if an id is this genome's; in older files it may begin with a digit.
     pub fn has_id(&self, id: &str) -> bool {
         id == self.id() || id == &self.digest()[..10]
     }
@@ -143,7 +142,7 @@ impl Genome {
         hash::sha256_hex(&[self.cppn.canonical_bytes(), self.edits.canonical_bytes()].concat())
     }
 
-    /// Returns a copy mutated once or more, until its body is valid; with that body. A fraction
+    /// Mutates a copy until its body is valid, at least once; returns it with that body. A fraction
     /// [`MutationParams::voxel_mutations`] of offspring has voxels mutated instead.
     ///
     /// # Errors
@@ -168,13 +167,13 @@ impl Genome {
         rng: &mut Stream,
         session: &Session,
     ) -> Result<(Genome, Body), GenomeError> {
-        // Without voxel mutations nothing is drawn: runs are as before there were any.
+        // With no voxel mutations nothing is drawn, so that older runs stay reproducible.
         if params.voxel_mutations == 0.0 || rng.unit() >= params.voxel_mutations {
             return self.with_mutated_network(spec, params, rng, session);
         }
         let described = self.cppn.express(spec.height, spec.width)?;
         match self.with_voxels_changed(&described, spec, params, rng, session) {
-            // No valid body was hit in all those draws.
+            // No draw of voxels gave a valid body.
             Err(GenomeError::NoValidBody { .. }) => self.with_mutated_network(spec, params, rng, session),
             changed => changed,
         }
@@ -191,7 +190,7 @@ impl Genome {
         let mutations = if min_muscles > height.saturating_mul(width) { 0 } else { MAX_MUTATIONS };
         let mut genome = self.clone();
         for number in 1..=mutations {
-            // A quick search completes anyway: a run stopped at its start still gets its folder.
+            // The first check comes late: a run stopped at its start still gets its folder.
             if number % MUTATIONS_AT_ONCE == 0 {
                 session.check()?;
             }
@@ -204,7 +203,7 @@ impl Genome {
         Err(GenomeError::NoValidBody { mutations, height, width, min_muscles })
     }
 
-    /// Makes a random individual: [`Genome::initial`], mutated until its body is valid; and that.
+    /// Mutates [`Genome::initial`] until its body is valid; returns the individual with that body.
     ///
     /// # Errors
     /// As [`Genome::offspring`].

@@ -1,6 +1,5 @@
-//! Images that robots are not trained on: those of the test split, and validation images. The
-//! latter are those of the training split that a run neither is trained on nor chooses its training
-//! images among, drawn by its seed.
+//! Images that robots are not trained on: test images and validation images. A run's seed draws the
+//! latter from the training split, without those it trains on or chooses its training images from.
 
 use crate::base::error::{Error, ErrorKind};
 use crate::base::random::{Purpose, stream};
@@ -14,7 +13,7 @@ use crate::store::run::RunFile;
 use crate::store::training::Origin;
 use std::collections::BTreeSet;
 
-/// Indices of all images that a run was trained on, and before that its gaits.
+/// Returns the indices of all images that a run, and its gaits before, were trained on.
 pub(crate) fn trained_on(run: &RunFile, dataset: &Dataset) -> Result<BTreeSet<usize>, Error> {
     let mut seen: BTreeSet<usize> =
         run.origin.iter().flat_map(|origin: &Origin| &origin.trained_on).copied().collect();
@@ -23,7 +22,7 @@ pub(crate) fn trained_on(run: &RunFile, dataset: &Dataset) -> Result<BTreeSet<us
     Ok(seen)
 }
 
-/// Of each class the images that are not among those seen.
+/// Returns the images of each class that are not in `seen`.
 fn left(classes: &[u8], seen: &BTreeSet<usize>, dataset: &Dataset) -> Vec<Vec<ImageRef>> {
     let of_class = |&label: &u8| {
         let all = dataset.indices_of(Split::Train, label).iter();
@@ -33,15 +32,15 @@ fn left(classes: &[u8], seen: &BTreeSet<usize>, dataset: &Dataset) -> Vec<Vec<Im
     classes.iter().map(of_class).collect()
 }
 
-/// The number of images for which one could ask, evenly divided between the classes.
+/// Returns the largest number of images available, evenly divided between the classes.
 fn most(left: &[Vec<ImageRef>]) -> usize {
     left.iter().map(Vec::len).min().unwrap_or(0) * left.len()
 }
 
-/// How many are to be taken of each class, one or more; `asked` says where so many were asked for.
+/// Returns the number of images to take of each class, at least one; errors name `argument`.
 ///
 /// # Errors
-/// If a class has not as many.
+/// Returns an error if a class has too few images.
 fn per_class(
     classes: &[u8],
     left: &[Vec<ImageRef>],
@@ -69,12 +68,11 @@ fn per_class(
     }
 }
 
-/// Whether a run that is to choose robots when it ends will have images for that: to be known
-/// before it begins. `before`: on which images its gaits were trained; `key` says how many images of
-/// a class the run itself is trained on.
+/// Checks before a run begins that enough images remain to validate its robots at its end. `before`
+/// holds the images its gaits were trained on; `key` is the config key that sets its own number.
 ///
 /// # Errors
-/// If of a class there are not enough.
+/// Returns an error if a class has too few images.
 pub(crate) fn check(config: &Config, before: &[usize], key: &str, dataset: &Dataset) -> Result<(), Error> {
     let ValidationConfig { images, best } = config.validation;
     if best == 0 {
@@ -91,13 +89,12 @@ pub(crate) fn check(config: &Config, before: &[usize], key: &str, dataset: &Data
     })
 }
 
-/// `count` validation images of some runs of one experiment together, evenly divided between the
-/// classes, which take turns: so are the first of them. Of the same runs, in whichever order, they
-/// are always the same, and fewer of them the first of more. `argument` is the argument that
-/// asks for this number; `None`: the config does.
+/// Draws `count` validation images for runs of one experiment. They are evenly divided between the
+/// classes, which alternate. The order of the runs does not matter, and fewer images are always the
+/// first of more. `argument` is the argument that set `count`; `None` if the config did.
 ///
 /// # Errors
-/// If there are not enough images.
+/// Returns an error if there are not enough images.
 pub fn images(
     runs: &[&RunFile],
     dataset: &Dataset,
@@ -108,10 +105,10 @@ pub fn images(
     images_besides(&BTreeSet::new(), runs, &classes, dataset, argument, HowMany::Evenly(count))
 }
 
-/// The same of these classes, none of these images among them.
+/// Draws validation images of these classes without those in `besides`; see [`images`].
 ///
 /// # Errors
-/// As of [`images`].
+/// As [`images`].
 pub(crate) fn images_besides(
     besides: &BTreeSet<usize>,
     runs: &[&RunFile],
@@ -142,11 +139,11 @@ pub(crate) fn images_besides(
     Ok(turns.take(count).collect())
 }
 
-/// Test images of these classes, class after class: all of them, or so many, evenly divided between
-/// the classes, of which the first get what is left over.
+/// Returns test images, class by class: all, or an even share drawn of each class; the first
+/// classes get the remainder.
 ///
 /// # Errors
-/// If a class has too few.
+/// Returns an error if a class has too few images.
 pub(crate) fn test_images(
     classes: &[u8],
     dataset: &Dataset,

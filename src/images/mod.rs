@@ -1,5 +1,4 @@
-//! The images of a run: where its dataset lies, which images it is trained on, which it is tested
-//! on, and what its robots see of them.
+//! The images of a run: its dataset; training, validation and test images; what its robots see.
 
 pub mod held_out;
 pub mod training;

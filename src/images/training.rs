@@ -1,4 +1,4 @@
-//! [`Training`]: the images a run evolves on, as its robots see them.
+//! [`Training`]: the training images of a run, as its robots see them.
 
 use crate::base::Grid;
 use crate::base::error::Error;
@@ -11,25 +11,24 @@ use crate::task::perturbation::Condition;
 use crate::task::score::Answer;
 use std::path::Path;
 
-/// The images a run evolves on, and how they are shown.
+/// The training images of a run and their stimuli.
 #[derive(Clone, Debug)]
 pub struct Training {
-    /// Where they come from.
+    /// Dataset of the images.
     pub dataset: DatasetRef,
-    /// The images, in the order in which a sequential rollout sees them.
+    /// Images, in the order of a sequential rollout.
     pub images: Vec<ImageRef>,
-    /// What the sensors see of each: H × W in [0, 1]. Where a response is measured, as many images
-    /// of their pixels.
+    /// Stimuli, H × W in [0, 1]: the images as the sensors see them or, where a response is
+    /// measured, as many made from their pixels.
     pub stimuli: Vec<Grid<f64>>,
-    /// Under what each is shown, in a fresh rollout; the default where one is missing.
+    /// Condition of each stimulus in a fresh rollout; the default where one is missing.
     pub conditions: Vec<Condition>,
 }
 
-/// The number of training images of the scarcest of some classes, of a task that was asked for by
-/// its name.
+/// Returns the number of training images of the class that has fewest.
 ///
 /// # Errors
-/// If it is less than `least`; which class, and which there are.
+/// If it is less than `least`, the error names the class and all classes of the dataset.
 pub(crate) fn scarcest(dataset: &Dataset, classes: &[u8], least: usize) -> Result<usize, Error> {
     let counts = classes.iter().map(|class| (dataset.indices_of(Split::Train, *class).len(), *class));
     match counts.min() {
@@ -45,19 +44,19 @@ pub(crate) fn scarcest(dataset: &Dataset, classes: &[u8], least: usize) -> Resul
 }
 
 impl Training {
-    /// The training images of a config.
+    /// Loads the training images of a config.
     ///
     /// # Errors
-    /// If the data are missing or broken, or an image is of a class that is not in the task, or a
-    /// class has no image.
+    /// Returns an error if the data are missing or broken, if an image is of a class outside the
+    /// task, or if a class has no image.
     pub fn load(config: &Config, data: Option<&Path>) -> Result<Self, Error> {
         Training::of(config, &load_dataset(config, data, &[Split::Train])?)
     }
 
-    /// Indices of the training images of a config.
+    /// Returns the indices of the training images of a config.
     ///
     /// # Errors
-    /// If a class has not as many images as are to be drawn.
+    /// Returns an error if a class has too few images to draw from.
     pub fn indices(config: &Config, dataset: &Dataset) -> Result<Vec<usize>, Error> {
         match &config.data.train_images {
             Some(indices) => Ok(indices.clone()),
@@ -71,7 +70,7 @@ impl Training {
         }
     }
 
-    /// The training images of a config, one or more of each class of its task.
+    /// Returns the training images of a config, at least one of each class of its task.
     ///
     /// # Errors
     /// As [`Training::load`].
@@ -97,7 +96,7 @@ impl Training {
         }
     }
 
-    /// The training images of a config, of a dataset that is loaded.
+    /// Takes the training images of a config from a loaded dataset.
     ///
     /// # Errors
     /// As [`Training::load`].
@@ -111,7 +110,7 @@ impl Training {
         Ok(Training { dataset, images, stimuli, conditions })
     }
 
-    /// The images for people: one by one if they are few.
+    /// Describes the images to the user, one by one if they are few.
     pub fn listed(&self) -> String {
         const FEW: usize = 8;
         if self.images.len() > FEW {
@@ -124,8 +123,7 @@ impl Training {
         self.images.iter().map(image).collect::<Vec<_>>().join(", ")
     }
 
-    /// The answers that displacements under the images are, in their order; those that are missing
-    /// are still to come.
+    /// Returns the answers to the images, given displacements in their order; the rest are pending.
     pub fn answers(&self, displacements: impl IntoIterator<Item = Option<f64>>) -> Vec<Answer> {
         answers(&self.images, displacements)
     }

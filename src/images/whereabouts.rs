@@ -1,5 +1,4 @@
-//! [`Whereabouts`]: where images are looked for. A run remembers where its own were, in a file
-//! beside its `run.json`.
+//! [`Whereabouts`]: the folders of images. A run remembers its own in a file beside `run.json`.
 
 use crate::base::Grid;
 use crate::base::error::Error;
@@ -18,10 +17,9 @@ use crate::task::stimulus::{StimulusParams, stimulus};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// What the file calls itself, and the version of its schema.
+/// Name and version of the file's schema.
 const FORMAT: (&str, u32) = ("morphcog-data-folder", 1);
 
-/// The content of `data-folder.json`.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct DataFolder {
@@ -29,31 +27,30 @@ struct DataFolder {
     format_version: u32,
     /// Name of the dataset.
     dataset: String,
-    /// The folder with its files; if it is not absolute, as someone may write it: from the run's
-    /// folder on.
+    /// Folder with its files; users may write one relative to the run's folder.
     folder: PathBuf,
 }
 
-/// Where images are looked for, in this order: in the folder that the command line says, in that of
-/// `MORPHCOG_DATA`, in the one that a run remembers (if it is still there), in the config's `[data]
-/// dir`, or else in `data/<name>`.
+/// The folders in which images are looked for, in this order: that of the command line,
+/// `MORPHCOG_DATA`, the one that a run remembers (if it still exists), the config's `[data] dir`,
+/// and `data/<name>`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Whereabouts {
-    /// The folder that the command line says.
+    /// Folder from the command line.
     data: Option<PathBuf>,
-    /// Files that may say where a run's images were.
+    /// Files that may name the folder of a run's images.
     remembered: Vec<PathBuf>,
-    /// The run.json, or the first of several, for messages.
+    /// The first run.json given, for messages.
     run_json: Option<PathBuf>,
 }
 
 impl Whereabouts {
-    /// What is known without a run: `data` is the folder that the command line says.
+    /// Starts without a run; `data` is the folder from the command line.
     pub fn given(data: Option<&Path>) -> Self {
         Whereabouts { data: data.map(Path::to_path_buf), remembered: Vec::new(), run_json: None }
     }
 
-    /// What is known with a run.json, or another file beside one.
+    /// Adds the folder that a run remembers, by its run.json or another file beside it.
     #[must_use]
     pub fn and_of(mut self, run_json: &Path) -> Self {
         self.remembered.push(run_json.with_file_name(DATA_FOLDER));
@@ -61,13 +58,13 @@ impl Whereabouts {
         self
     }
 
-    /// The same of the run in a folder, if it goes on: one that is replaced has no say.
+    /// Adds the folder of a run that is resumed; a run that is replaced does not count.
     #[must_use]
     pub(crate) fn and_of_resumed(self, if_exists: IfExists, run_json: &Path) -> Self {
         if if_exists == IfExists::Resume { self.and_of(run_json) } else { self }
     }
 
-    /// An error about the images that a run asks for, with the file that does.
+    /// Adds the run.json that needs the images to an error.
     pub(crate) fn asked_by(&self, error: Error) -> Error {
         match &self.run_json {
             Some(path) => error.in_place(&path.display().to_string()),
@@ -78,7 +75,7 @@ impl Whereabouts {
     /// Loads the dataset of a section `[data]`.
     ///
     /// # Errors
-    /// What is missing or broken, where it was looked for and what to do.
+    /// The error says what is missing or broken, where it was looked for, and what to do.
     pub fn load(&self, config: &DataConfig, wanted: &[Split]) -> Result<Dataset, Error> {
         if config.dataset == BUILTIN {
             return Dataset::builtin(config.builtin.clone(), wanted).map_err(Error::from);
@@ -98,11 +95,11 @@ impl Whereabouts {
         })
     }
 
-    /// Loads the dataset whose training images have this SHA-256. Where only other splits are wanted,
-    /// it is known by its training images if these are there.
+    /// Loads the dataset whose training images have this SHA-256. If only other splits are wanted,
+    /// it is checked by its training images if they exist.
     ///
     /// # Errors
-    /// As [`Whereabouts::load`]; or that it is another one: images of the same index would be others.
+    /// As [`Whereabouts::load`]; also if it is another dataset, whose indices mean other images.
     pub(crate) fn load_of(
         &self,
         train_sha256: &str,
@@ -122,8 +119,7 @@ impl Whereabouts {
         if is_it {
             return Ok(loaded);
         }
-        // By their names the files may be transposed now, and were not when the run was made, or the
-        // other way round: the sum says which it was.
+        // File names may imply another orientation than when the run was made: the hash decides.
         if config.transpose.is_none() && loaded.folder().is_some() {
             let other = DataConfig { transpose: Some(!loaded.is_transposed()), ..config.clone() };
             if let Ok((loaded, true)) = load(&other) {
@@ -137,9 +133,8 @@ impl Whereabouts {
         Err(self.asked_by(Error::input(text)).remedy(Remedy::NameData))
     }
 
-    /// The folder in which a dataset is looked for if neither the command line nor a run says where
-    /// its images are: the one of the config, or else `data/<name>`; none if it is not there, or
-    /// nothing needs to be there.
+    /// Returns the folder of the config, or else `data/<name>`, if images are looked for there.
+    /// Returns `None` if the command line or a run names one, it does not exist, or none is needed.
     pub(crate) fn by_default(&self, config: &DataConfig) -> Option<PathBuf> {
         let is_known = self.data.is_some() || self.remembered(&config.dataset).ok()?.0.is_some();
         if config.dataset == BUILTIN || is_known {
@@ -149,8 +144,8 @@ impl Whereabouts {
         folder.is_dir().then_some(folder)
     }
 
-    /// The first remembered folder with a dataset of this name that is still there; and the first
-    /// that is not.
+    /// Returns the first remembered folder of a dataset that still exists, and the first that does
+    /// not.
     fn remembered(&self, dataset: &str) -> Result<(Option<Place>, Option<Place>), Error> {
         let mut gone = None;
         for path in self.remembered.iter().filter(|path| path.exists()) {
@@ -172,16 +167,16 @@ impl Whereabouts {
     }
 }
 
-/// Writes down where a run's images are; nothing of those that the program draws.
+/// Records the folder of a run's images, unless the program draws them.
 ///
 /// # Errors
-/// If it cannot be written.
+/// Returns an error if the file cannot be written.
 pub(crate) fn remember(folder: &RunFolder, dataset: &Dataset) -> Result<(), Error> {
     let path = folder.path().join(DATA_FOLDER);
     let failed = |error: &std::io::Error| Error::writing(&path, error);
     let Some(source) = dataset.folder() else { return Ok(()) };
     let absolute = std::path::absolute(source).map_err(|error| failed(&error))?;
-    // A name that is no text cannot be written down: then it is named with --data, as before.
+    // JSON cannot hold a path that is not Unicode: the user names it with --data again.
     if absolute.to_str().is_none() {
         return Ok(());
     }
@@ -195,19 +190,19 @@ pub(crate) fn remember(folder: &RunFolder, dataset: &Dataset) -> Result<(), Erro
     write_atomically(&path, text.as_bytes()).map_err(|error| failed(&error))
 }
 
-/// Loads the dataset of a config; `data` is the folder given on the command line.
+/// Loads the dataset of a config; `data` is the folder from the command line.
 ///
 /// # Errors
-/// What is missing or broken, where it was looked for and what to do.
+/// As [`Whereabouts::load`].
 pub fn load_dataset(config: &Config, data: Option<&Path>, wanted: &[Split]) -> Result<Dataset, Error> {
     Whereabouts::given(data).load(&config.data, wanted)
 }
 
-/// Loads the dataset that a run was made with; any, if none is said. Where only other splits are
-/// wanted, it is known by its training images if these are there.
+/// Loads the dataset that a run was made with, or, without a run, any. If only other splits are
+/// wanted, it is checked by its training images if they exist.
 ///
 /// # Errors
-/// As [`load_dataset`]; or that it is another one: images of the same index would be others.
+/// As [`load_dataset`]; also if it is another dataset, whose indices mean other images.
 pub fn load_dataset_of(
     run: Option<&DatasetRef>,
     config: &Config,
@@ -220,7 +215,7 @@ pub fn load_dataset_of(
     }
 }
 
-/// Says so if images are transposed by their names alone: who stored them upright wants to know.
+/// Reports that file names alone made images transposed, for users who stored them upright.
 pub(crate) fn say_transposed(dataset: &Dataset, config: &DataConfig, session: &Session) {
     if config.transpose.is_none() && dataset.is_transposed() {
         session.observer.note(&format!(
@@ -231,9 +226,8 @@ pub(crate) fn say_transposed(dataset: &Dataset, config: &DataConfig, session: &S
     }
 }
 
-/// Height and width of the images that a run was made with, as far as that is known: those of the
-/// dataset that is loaded, if the run was made with it, or of one that is published. `data` is none
-/// of the published robots.
+/// Returns the image size (height, width) that a run was made with, if known: that of the loaded
+/// dataset if they match, else that of a published dataset called `name`.
 pub(crate) fn size_of(data: &DatasetRef, name: &str, loaded: &Dataset) -> Option<[usize; 2]> {
     match loaded.fingerprint(Split::Train).as_ref() == Some(&data.train_sha256) {
         true => loaded.size(Split::Train),
@@ -241,8 +235,8 @@ pub(crate) fn size_of(data: &DatasetRef, name: &str, loaded: &Dataset) -> Option
     }
 }
 
-/// What is to be said if robots that see a part of their images are shown images of another size
-/// than they were made for: the part is counted in pixels.
+/// Returns a warning if robots that see part of their images get images of another size than they
+/// were made for: margins are counted in pixels.
 pub(crate) fn part_of_others(
     config: &Config,
     size: Option<[usize; 2]>,
@@ -261,15 +255,15 @@ pub(crate) fn part_of_others(
     Some(format!("the robots were made for {others}; of these they see {part}"))
 }
 
-/// What a robot of a config sees of an image.
+/// Returns an image as a robot of a config sees it.
 ///
 /// # Errors
-/// If the image does not go with the body's size.
+/// Returns an error if the image does not fit the body's size.
 pub fn see(config: &Config, dataset: &Dataset, split: Split, index: usize) -> Result<Grid<f64>, Error> {
     seen(&config.body, &config.stimulus, dataset, split, index)
 }
 
-/// What a robot of a config sees of several images, in their order.
+/// Returns several images as a robot of a config sees them, in their order.
 ///
 /// # Errors
 /// As [`see`].
@@ -282,10 +276,10 @@ pub(crate) fn see_all(
     images.iter().map(|image| see(config, dataset, split, image.index)).collect()
 }
 
-/// What a robot of this size sees of an image.
+/// Returns an image as a robot of this size sees it.
 ///
 /// # Errors
-/// If the image does not go with the body's size.
+/// Returns an error if the image does not fit the body's size.
 pub fn seen(
     &BodyConfig { height, width, .. }: &BodyConfig,
     params: &StimulusParams,

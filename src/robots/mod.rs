@@ -1,5 +1,4 @@
-//! Which robots are meant: those of archives that an argument selects, and the published ones,
-//! which are one more run.
+//! The selection of robots: from the archives of an argument, or from the published run.
 
 pub mod published;
 pub mod selection;
@@ -10,7 +9,7 @@ use crate::store::folder;
 use crate::store::run::StoredRun;
 use std::path::{Path, PathBuf};
 
-/// Opens a run.json, also that of the published robots.
+/// Opens a run.json, or the built-in run of the published robots.
 ///
 /// # Errors
 /// As [`StoredRun::read`].
@@ -21,11 +20,11 @@ pub fn open(path: &Path) -> Result<StoredRun, Error> {
     }
 }
 
-/// Returns the archives that a selection is from: those that are named, or else the published
-/// robots if it names these, or else the newest run.
+/// Returns the archives to select from: the named ones, or the published robots if the selection
+/// names them, or the newest run.
 ///
 /// # Errors
-/// If there is no run.
+/// Returns an error if there is no run.
 pub fn archives(named: Vec<PathBuf>, robots: Selection) -> Result<(Vec<PathBuf>, Selection), Error> {
     if !named.is_empty() {
         return Ok((named, robots));

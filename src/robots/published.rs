@@ -1,5 +1,5 @@
-//! `morphcog gallery`: the zero-one robots that the paper's authors published; and robots that were
-//! trained here.
+//! `morphcog gallery`: the zero-one robots published by the paper's authors, and robots trained
+//! here.
 
 use crate::base::error::Error;
 use crate::base::remedy::{Invocation, Remedy};
@@ -19,20 +19,18 @@ use crate::task::judge::Judge;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// The config under which the published robots were evolved.
+/// Config under which the published robots were evolved.
 const CONFIG: &str = "zero_one_published.toml";
 
-/// What all published robots are called together.
+/// Name of the set of all published robots.
 pub const ALL: &str = "gallery";
 
-/// The list of them.
 pub(crate) const TEXT: &str = include_str!("../../data/gallery.json");
 
-/// The runs of a set that ships with the program, [`gallery::ZERO_ONE`] or [`gallery::TEAM`], each with
-/// its audit, in their order.
+/// Reads the runs of a shipped set, [`gallery::ZERO_ONE`] or [`gallery::TEAM`], with their audits.
 ///
 /// # Errors
-/// If there is no such set, or what is built in is damaged (which a test excludes).
+/// Returns an error if there is no such set, or if it is damaged (which a test excludes).
 pub fn trained(set: &str) -> Result<Vec<(RunFile, AuditFile)>, Error> {
     let paths = gallery::runs(set).map_err(Error::other)?;
     let read =
@@ -45,26 +43,26 @@ pub fn trained(set: &str) -> Result<Vec<(RunFile, AuditFile)>, Error> {
 pub struct Published {
     /// Its name, as published.
     pub name: String,
-    /// Its published fitness, voxel lengths.
+    /// Its published fitness \[voxel lengths\].
     pub fitness: f64,
-    /// The way it walks under a zero; under a one it walks the other.
+    /// Direction in which it walks under a zero; under a one it walks the other way.
     pub zero_walks: Direction,
     /// Its body.
     pub body: Body,
 }
 
 impl Published {
-    /// What its walks say.
+    /// Returns the classes that its two directions stand for.
     pub fn judge(&self) -> Judge {
         let says = |way| if way == self.zero_walks { vec![0] } else { vec![1] };
         Judge { left: says(Direction::Left), right: says(Direction::Right) }
     }
 }
 
-/// All published robots.
+/// Returns all published robots.
 ///
 /// # Errors
-/// If the built-in list is damaged (which a test excludes).
+/// Returns an error if the built-in list is damaged (which a test excludes).
 pub fn gallery() -> Result<Vec<Published>, Error> {
     #[derive(Deserialize)]
     struct Entry {
@@ -82,7 +80,7 @@ pub fn gallery() -> Result<Vec<Published>, Error> {
     entries.into_iter().map(robot).collect()
 }
 
-/// The published robot of a name, in any case of letters.
+/// Finds a published robot by name, ignoring case.
 ///
 /// # Errors
 /// As [`gallery`].
@@ -90,20 +88,20 @@ pub fn find(name: &str) -> Result<Option<Published>, Error> {
     Ok(gallery()?.into_iter().find(|robot| robot.name.eq_ignore_ascii_case(name)))
 }
 
-/// How the published robots were evolved.
+/// Returns the config under which the published robots were evolved.
 ///
 /// # Errors
-/// If the built-in config is damaged (which a test excludes).
+/// Returns an error if the built-in config is damaged (which a test excludes).
 pub fn config() -> Result<Config, Error> {
     let text = BUILT_IN.iter().find(|(name, _)| *name == CONFIG).map_or("", |(_, text)| text);
     Config::parse(text, CONFIG, &[])
 }
 
-/// Whether a selection, of no archive in particular, means published robots: the word for all of
-/// them, or their names.
+/// Returns true if a selection without an archive names published robots, one by one or all by
+/// "gallery".
 ///
 /// # Errors
-/// As [`gallery`].
+/// As [`gallery`]; also if only some of the names are published.
 pub fn is_meant(selection: &Selection) -> Result<bool, Error> {
     let Selection::Ids(ids) = selection else { return Ok(false) };
     if matches!(ids.as_slice(), [word] if word == ALL) {
@@ -120,7 +118,7 @@ pub fn is_meant(selection: &Selection) -> Result<bool, Error> {
     }
 }
 
-/// Says where robots come from: the name of their run and its seed, or that they were published.
+/// Describes the origin of robots: the name and seed of their run, or that they were published.
 pub fn provenance(run: &str, seed: u64) -> String {
     match run == ALL {
         true => "published with the paper".to_string(),
@@ -128,16 +126,16 @@ pub fn provenance(run: &str, seed: u64) -> String {
     }
 }
 
-/// Returns the archive that the published robots are in.
+/// Returns the archive of the published robots.
 pub(crate) fn archive() -> PathBuf {
     Path::new(gallery::PUBLISHED).join(RUN_JSON)
 }
 
-/// Makes a run of the published robots. Their genomes were not published: each has the empty one,
-/// and plus or minus its fitness as displacements.
+/// Builds a run of the published robots. Their genomes were not published, so each has the empty
+/// one, and plus or minus its fitness as displacements.
 ///
 /// # Errors
-/// If what is built in is damaged (which a test excludes).
+/// Returns an error if the built-in data are damaged (which a test excludes).
 pub(crate) fn run() -> Result<RunFile, Error> {
     let config = config()?;
     let indices = config.data.train_images.iter().flatten();

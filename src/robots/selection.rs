@@ -1,4 +1,4 @@
-//! Choosing robots of one run or several: all, the fittest, some at random, or by id.
+//! Choosing robots of one or several runs: all, the fittest, some at random, or by id.
 
 use crate::base::error::Error;
 use crate::base::random::{Purpose, stream};
@@ -14,45 +14,43 @@ use std::str::FromStr;
 /// The word for the best robot.
 pub const BEST: &str = "best";
 
-/// A robot, and the run it is of, by its place among several.
+/// A robot and the index of its run.
 #[derive(Clone, Copy, Debug)]
 pub struct Chosen<'a> {
-    /// Which of the runs.
+    /// Index of its run.
     pub source: usize,
     /// The robot.
     pub robot: &'a Robot,
 }
 
-/// Which robots of one run, or of several together.
+/// A selection of robots from one run, or from several together.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Selection {
-    /// All of them, fittest first.
+    /// All, fittest first.
     All,
-    /// The fittest of each task, this many.
+    /// This many of each task, the fittest.
     Top(usize),
-    /// So many of each task, drawn at random.
+    /// This many of each task, drawn at random.
     Random(usize),
-    /// The best of each run and task on validation images, this many; only `eval` shows those.
+    /// This many of each run and task, the best on validation images.
     Validated(usize),
-    /// Those with these ids, or unique beginnings of ids; "best" is the first on validation images
-    /// if the runs ranked their robots by those (validation.json), else the fittest.
+    /// By id, or the unique beginning of one. "best" is the best on validation images if all runs
+    /// have rankings (validation.json), else the fittest.
     Ids(Vec<String>),
-    /// These, by the place of their run and by id, with a description of how they were
-    /// chosen.
+    /// By run index and id, with a description of the choice.
     Drawn {
-        /// The robots.
+        /// Run index and id of each robot.
         robots: Vec<(usize, String)>,
-        /// For people.
+        /// Description for the user.
         about: String,
     },
-    /// So selected, but from those robots only that an audit found physical.
+    /// Like the inner selection, but only from robots that an audit found physical.
     Physical(Box<Selection>),
 }
 
-/// Selects the best robots on validation images.
+/// Word that selects the best robots on validation images.
 pub(crate) const VALIDATED: &str = "best-validation";
 
-/// What can be read as a selection.
 const EXPECTED: &str = "expected all, top:N, random:N, best-validation:N, or, separated by commas, ids or their \
  beginnings, best, \
 names of published robots or gallery";
@@ -77,14 +75,13 @@ impl FromStr for Selection {
 }
 
 impl Selection {
-    /// The same among the robots only that the audits beside the runs found physical, if `only`
-    /// says so.
+    /// Restricts the selection to robots that audits found physical, if `only` is true.
     #[must_use]
     pub fn physical(self, only: bool) -> Self {
         if only { Selection::Physical(Box::new(self)) } else { self }
     }
 
-    /// How many of the selected are to be chosen by validation, if that is asked for.
+    /// Returns the number of robots to choose by validation; `None` for other selections.
     pub fn validated(&self) -> Option<usize> {
         match self {
             Selection::Validated(count) => Some(*count),
@@ -93,7 +90,7 @@ impl Selection {
         }
     }
 
-    /// What it says, for people.
+    /// Describes the selection to the user.
     pub fn describe(&self) -> String {
         match self {
             Selection::All => "all elites".to_string(),
@@ -112,18 +109,18 @@ impl Selection {
         }
     }
 
-    /// The robots; where no order is given: task by task, the fittest first. `seed` is for the
-    /// random ones. For a validation: all that are to be looked at.
+    /// Returns the robots, by default task by task and fittest first. `seed` draws the random ones.
+    /// For a validation, returns all candidates.
     ///
     /// # Errors
-    /// If there is no robot, or no single one, of an id; if only physical ones are asked for, and
-    /// they are not known.
+    /// Returns an error if an id matches no robot or several, or if physical ones are selected and
+    /// the audits are incomplete.
     pub fn of<'a>(&self, sources: &'a [StoredRun], seed: u64) -> Result<Vec<Chosen<'a>>, Error> {
         let robots = |(source, from): (usize, &'a StoredRun)| {
             from.run.elites.iter().map(move |robot| Chosen { source, robot })
         };
         let mut fittest: Vec<Chosen> = sources.iter().enumerate().flat_map(robots).collect();
-        // Stable: equally fit ones stay in the order of their runs and cells.
+        // The sort is stable: ties keep the order of their runs and cells.
         fittest.sort_by(|a, b| b.robot.objective.total_cmp(&a.robot.objective));
         if fittest.is_empty() {
             let names: Vec<String> = sources.iter().map(|source| source.path.display().to_string()).collect();
@@ -132,9 +129,8 @@ impl Selection {
         self.among(fittest, sources, seed)
     }
 
-    /// The same robots of several runs, each run's by their ids, so that runs can be looked at one
-    /// after the other: `None` for a run of which there are none. Who is best on validation images
-    /// is told run by run as it is.
+    /// Splits the selection into one by ids for each run, so that runs can be handled one by one;
+    /// `None` for a run without a selected robot. A validation selects run by run already.
     ///
     /// # Errors
     /// As [`Selection::of`].
@@ -178,7 +174,7 @@ impl Selection {
                 Ok((0..).zip(by_task()).flat_map(draw).collect())
             }
             Selection::Ids(ids) => {
-                // A robot named twice is one robot.
+                // A robot named twice counts once.
                 let named = ids.iter().map(|id| match id == BEST {
                     true => Ok(best(&fittest, sources)?.into_iter().collect()),
                     false => by_id(&fittest, id),
@@ -198,8 +194,8 @@ impl Selection {
                 let found: Result<Vec<_>, Error> = robots.iter().map(find).collect();
                 Ok(found?.into_iter().flatten().collect())
             }
-            // The first in a ranking can be told without the last; it is asked when they are
-            // ranked.
+            // A ranking needs audits only down to the last robot chosen; `first_physical` checks
+            // those.
             Selection::Physical(of) if of.validated().is_some() && !all_audited(&fittest, sources)? => {
                 Ok(fittest)
             }
@@ -208,11 +204,11 @@ impl Selection {
     }
 }
 
-/// The best of some robots, given fittest first: the first on validation images if all runs ranked
-/// their robots by those, and ranked one of these; else the fittest.
+/// Returns the best of some robots, given fittest first: the best on validation images if all runs
+/// have rankings and any of these is in one, else the fittest.
 ///
 /// # Errors
-/// If a file of rankings cannot be read.
+/// Returns an error if a ranking cannot be read.
 fn best<'a>(fittest: &[Chosen<'a>], sources: &'a [StoredRun]) -> Result<Option<Chosen<'a>>, Error> {
     let rankings: Result<Vec<Option<Vec<Validated>>>, Error> = sources.iter().map(ranking).collect();
     let rankings: Option<Vec<Vec<Validated>>> = rankings?.into_iter().collect();
@@ -220,7 +216,7 @@ fn best<'a>(fittest: &[Chosen<'a>], sources: &'a [StoredRun]) -> Result<Option<C
     for (source, ranked) in rankings.iter().flatten().enumerate() {
         for Validated { id, task, balanced_accuracy, .. } in ranked {
             let is_it = |c: &&Chosen| c.source == source && c.robot.id == *id && c.robot.task == *task;
-            // Of equals the first stays, which was fitter.
+            // On a tie the earlier one stays, which was fitter.
             if first.is_none_or(|(_, accuracy)| *balanced_accuracy > accuracy)
                 && let Some(chosen) = fittest.iter().find(is_it)
             {
@@ -231,8 +227,7 @@ fn best<'a>(fittest: &[Chosen<'a>], sources: &'a [StoredRun]) -> Result<Option<C
     Ok(first.map(|(chosen, _)| chosen).or(fittest.first().copied()))
 }
 
-/// The robot of an id, or of the unique beginning of one. Of several runs that have it all, as when
-/// they started from one archive, from each.
+/// Finds a robot by id or its unique beginning; in every run that has it, as after a common start.
 pub(crate) fn by_id<'a>(robots: &[Chosen<'a>], id: &str) -> Result<Vec<Chosen<'a>>, Error> {
     let lower = id.to_ascii_lowercase();
     let found: Vec<Chosen> = robots
@@ -256,7 +251,7 @@ pub(crate) fn by_id<'a>(robots: &[Chosen<'a>], id: &str) -> Result<Vec<Chosen<'a
     }
 }
 
-/// The file of verdicts on a run.
+/// Returns the path of the run's audit.
 fn path(source: &StoredRun) -> PathBuf {
     AuditFile::path(&source.path)
 }
@@ -265,16 +260,16 @@ fn audits(sources: &[StoredRun]) -> Result<Vec<AuditFile>, Error> {
     sources.iter().map(|source| AuditFile::of_run(&source.run, &source.path)).collect()
 }
 
-/// Whether there are verdicts on all of them.
+/// Returns true if all these robots have verdicts.
 ///
 /// # Errors
-/// As of [`AuditFile::of_run`].
+/// As [`AuditFile::of_run`].
 pub(crate) fn all_audited(robots: &[Chosen], sources: &[StoredRun]) -> Result<bool, Error> {
     let audits = audits(sources)?;
     Ok(robots.iter().all(|chosen| audits[chosen.source].robot(&chosen.robot.id).is_some()))
 }
 
-/// The physical ones, fittest first; those that are named must be among them.
+/// Returns the physical ones, fittest first; an error if a named one is not.
 pub(crate) fn physical<'a>(
     selection: &Selection,
     fittest: Vec<Chosen<'a>>,
@@ -289,8 +284,7 @@ pub(crate) fn physical<'a>(
             named.extend(by_id(&fittest, id)?);
         }
     }
-    // Who names robots needs to know of those only; of a part of an archive nothing can be drawn
-    // fairly.
+    // Named robots need only their own verdicts; other selections would be unfair without all.
     let is_named = matches!(selection, Selection::Ids(ids) if !ids.iter().any(|id| id == BEST));
     for chosen in if is_named { &named } else { &fittest } {
         if found(chosen).is_none() {
@@ -324,11 +318,11 @@ pub(crate) fn physical<'a>(
     Ok(physical)
 }
 
-/// Of robots of a run, best on validation images first, the first of each task that are physical.
-/// What comes after them need not have been audited.
+/// Returns the first `count` physical robots of each task, given best on validation images first.
+/// Robots ranked after those need no audit.
 ///
 /// # Errors
-/// If one that comes before them has not been, or none of a task is physical.
+/// Returns an error if one ranked before them has no audit, or if none of a task is physical.
 pub(crate) fn first_physical<'a>(
     ranked: Vec<(&'a Robot, Validated)>,
     source: &StoredRun,

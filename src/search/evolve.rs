@@ -1,4 +1,4 @@
-//! `morphcog evolve`: MAP-Elites over bodies, resumable, the same bits however it is run.
+//! `morphcog evolve`: resumable MAP-Elites over bodies, with the same bits however it is run.
 
 use crate::base::error::{Error, ErrorKind};
 use crate::base::files::write_atomically;
@@ -30,42 +30,40 @@ use rayon::prelude::*;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// What to evolve and where to.
+/// The config of a run, and its output folder.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Everything the result depends on.
+    /// Everything that the result depends on.
     pub config: Config,
     /// Name of the run.
     pub name: String,
     /// Its folder.
     pub out: PathBuf,
-    /// What to do if there is a run in it.
+    /// Action if the folder already has a run.
     pub if_exists: IfExists,
 }
 
-/// How a session of a run ended.
+/// The result of a session.
 #[derive(Clone, Debug)]
 pub struct Finished {
-    /// The run as it stands in `run.json`.
+    /// The run as written to `run.json`.
     pub run: RunFile,
     /// Counts of the whole run.
     pub totals: Totals,
     /// Height and width of the training images.
     pub size: [usize; 2],
-    /// The best robots of each task on validation images, best first; none if the config asks for
-    /// none, or it was stopped.
+    /// Best robots of each task on validation images, best first; empty if the config wants none,
+    /// or if it was stopped.
     pub validated: Vec<Validated>,
-    /// Whether a signal stopped it before its end: its last generation, and the choice of robots
-    /// after that.
+    /// True if a signal stopped the run before its last generation, or before the choice of robots.
     pub stopped: bool,
-    /// Why its end is not, or not as a whole, in its files, if so; it goes on from its last
+    /// Error that kept the last state from being fully written; the run resumes from its last
     /// checkpoint.
     pub unwritten: Option<Error>,
 }
 
 impl Finished {
-    /// Id of the best robot: the first on validation images if some were chosen by them, else the
-    /// fittest.
+    /// Returns the id of the best robot on validation images or, without validation, the fittest.
     pub fn best(&self) -> Option<&str> {
         let better = |a: &Validated, b: &Validated| a.balanced_accuracy > b.balanced_accuracy;
         let first =
@@ -74,16 +72,15 @@ impl Finished {
     }
 }
 
-/// Runs a config, or goes on with a run, and at its end chooses robots on validation images if the
-/// config says so. When `stop` is set, a generation under way is dropped: the run is saved as it
-/// was before.
+/// Runs a config or resumes a run, then chooses robots on validation images if configured. If
+/// `stop` is set, it drops the current generation and saves the state before it.
 ///
 /// # Errors
-/// What is wrong with config, data or folder; nothing that was there is lost.
+/// Returns an error if config, data or folder is unsuitable. No existing results are lost.
 pub fn evolve(options: &Options, session: &Session) -> Result<Finished, Error> {
     let config = &options.config;
     let resumes = options.if_exists == IfExists::Resume;
-    // Load, and check all that can be known before anything is written.
+    // Check everything that can be known before anything is written.
     if resumes && options.out.join(TRAINING_JSON).exists() {
         let text = format!("{}: the run in this folder is a training", options.out.display());
         return Err(Error::occupied(text)
@@ -99,7 +96,7 @@ pub fn evolve(options: &Options, session: &Session) -> Result<Finished, Error> {
     let mutations =
         Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome, session };
     let first = mutations.random_immigrant(0, 0).map_err(unmade);
-    // Open. Only the leading rank has a folder.
+    // Only the leading rank has a folder.
     let ranks = session.ranks;
     let open = || RunFolder::open(&options.out, options.if_exists, session);
     let opened = first.and_then(|_| ranks.leads().then(open).transpose());
@@ -126,9 +123,7 @@ pub fn evolve(options: &Options, session: &Session) -> Result<Finished, Error> {
         Some(folder) => Some(Files { metrics: metrics(&folder, run.generation, session)?, folder }),
         None => None,
     };
-    // Evolve.
     pool.install(|| run.evolve(&mutations, &mut files, session)).map_err(goes_on)?;
-    // Write, and choose robots.
     let (file, totals) = (run.file(), run.totals());
     let is_whole = run.generation >= config.generations;
     let Some(mut files) = files else {
@@ -142,7 +137,7 @@ pub fn evolve(options: &Options, session: &Session) -> Result<Finished, Error> {
         });
     };
     let unwritten = files.save(&run).err().map(goes_on);
-    // Those of a run that is not in its file would be chosen from another.
+    // If the run was not written, robots would be chosen from an older run.json.
     let chooses = is_whole && unwritten.is_none() && config.validation.best > 0 && !file.elites.is_empty();
     let validated = match chooses {
         true => {
@@ -156,7 +151,7 @@ pub fn evolve(options: &Options, session: &Session) -> Result<Finished, Error> {
     Ok(Finished { run: file, totals, size, validated, stopped, unwritten })
 }
 
-/// The run's metrics.csv, to go on after a generation.
+/// Opens the run's metrics.csv to continue after a generation.
 fn metrics(folder: &RunFolder, generation: u64, session: &Session) -> Result<Metrics, Error> {
     let metrics = Metrics::open(folder.path(), generation)?;
     if metrics.missing > 0 {
@@ -166,14 +161,14 @@ fn metrics(folder: &RunFolder, generation: u64, session: &Session) -> Result<Met
     Ok(metrics)
 }
 
-/// How often lines of `metrics.csv` are handed to the system, for those who watch.
+/// Interval at which lines of `metrics.csv` reach the file, for those who watch it.
 const FLUSH_EVERY: Duration = Duration::from_secs(1);
 
-/// A checkpoint that is due by time waits until so many times what the last one cost has passed: a
-/// long run, whose checkpoints are large, spends at most two percent of its time on them.
+/// Least time between timed checkpoints, in multiples of the cost of the last one. Large
+/// checkpoints of long runs thus take at most two percent of the time.
 const MOST_SHARE: u32 = 50;
 
-/// Where a run is written.
+/// The output files of a run.
 struct Files {
     folder: RunFolder,
     metrics: Metrics,
@@ -187,7 +182,7 @@ impl Files {
     }
 }
 
-/// Adds to an error of a full disk how to go on when there is space again.
+/// Adds the advice to resume to an error of a full disk.
 fn goes_on(error: Error) -> Error {
     match error.kind == ErrorKind::Other && !error.remedies.is_empty() {
         true => error.remedy(Remedy::RepeatResuming),
@@ -195,7 +190,6 @@ fn goes_on(error: Error) -> Error {
     }
 }
 
-/// A run under way.
 struct Run<'a> {
     options: &'a Options,
     session: &'a Session<'a>,
@@ -206,12 +200,12 @@ struct Run<'a> {
     search: MapElites<Robot>,
     known: KnownBodies,
     totals: Totals,
-    /// Generations done.
+    /// Generations completed.
     generation: u64,
     began: Instant,
 }
 
-/// A robot to be evaluated: its number in the generation, the cell of its parent, and itself.
+/// A robot to be evaluated: its number in the generation, its parent's cell, and itself.
 type Child = (u64, Option<usize>, Robot);
 
 impl<'a> Run<'a> {
@@ -244,8 +238,7 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// Generation after generation: ask, score, tell. A generation that is stopped leaves the run
-    /// as it was before.
+    /// Repeats ask, evaluate, tell. A stopped generation leaves the run as it was before.
     fn evolve(
         &mut self,
         mutations: &Mutations,
@@ -259,7 +252,7 @@ impl<'a> Run<'a> {
         session.observer.generation(&self.progress());
         let every = Duration::try_from_secs_f64(config.checkpoint.seconds).unwrap_or(Duration::MAX);
         if let Some(files) = files.as_mut().filter(|_| self.generation == 0) {
-            // Somebody who watches the folder sees at once what has begun.
+            // Whoever watches the folder sees at once what has begun.
             files.save(self)?;
         }
         let [mut saved, mut flushed] = [Instant::now(); 2];
@@ -288,11 +281,11 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Makes, evaluates and tells one generation; every rank the same, but for the evaluation, of
-    /// which each does its share.
+    /// Makes and evaluates a generation, and adds it to the archive. All ranks do the same, but
+    /// each evaluates only its share.
     ///
     /// # Errors
-    /// Of kind [`ErrorKind::Stopped`] if it was stopped meanwhile: all is then as it was before.
+    /// If it was stopped, the kind is [`ErrorKind::Stopped`], and the run is as it was before.
     fn next_generation(&mut self, mutations: &Mutations, session: &Session) -> Result<(), Error> {
         let proposals = self.search.ask(self.generation);
         let make = |&proposal: &Proposal| {
@@ -320,8 +313,7 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Those children whose bodies are to be evaluated; and the keys of bodies that are known only
-    /// from now on.
+    /// Returns the children to evaluate, and the keys of the bodies that are new.
     fn unknown(&mut self, children: Vec<Child>) -> (Vec<Child>, Vec<[u8; 16]>) {
         let config = &self.options.config;
         let objective = config.objective();
@@ -356,11 +348,11 @@ impl<'a> Run<'a> {
         let evaluate = |jobs: &[Job]| {
             evaluate(jobs, stimuli, conditions, physics, protocol, config.savings, session).ok()
         };
-        // A generation that one rank drops is dropped by all.
+        // If one rank drops a generation, all do.
         Ok(ranks.scatter_gather(jobs, &sizes, evaluate).ok_or(Stopped)?)
     }
 
-    /// What this rank made, if all ranks made theirs.
+    /// Returns this rank's own result if all ranks have one.
     fn together<T>(&self, own: Result<T, Error>) -> Result<T, Error> {
         let is_made = own.is_ok();
         let are_made = self.session.ranks.share(is_made);
@@ -368,7 +360,7 @@ impl<'a> Run<'a> {
         if are_made.contains(&false) { Err(Stopped.into()) } else { Ok(own) }
     }
 
-    /// Puts those into the archive that walked and are fit enough.
+    /// Adds those children to the archive that were stable and are fit enough.
     fn tell(&mut self, children: Vec<Child>, evaluations: Vec<Evaluation>) -> Result<(), Error> {
         let thresholds = self.admission_thresholds();
         let mut told = Vec::new();
@@ -419,7 +411,7 @@ impl<'a> Run<'a> {
         Job { body, order, may_win: Box::new(may_win), given_up }
     }
 
-    /// A robot as it is told to the archive; `None` if it is not among the fittest that stay.
+    /// Scores a robot for the archive; `None` if `archive.keep` would remove it at once.
     fn judged(
         &self,
         child: u64,
@@ -438,22 +430,22 @@ impl<'a> Run<'a> {
         is_in.then_some(Evaluated { child, cell, objective, solution })
     }
 
-    /// By task the fitness of the last elite that `archive.keep` keeps; `None` while it keeps all,
-    /// or there are fewer. It never decreases, so what did not exceed it, or lost its cell, never
-    /// can: early stop and known bodies stay lossless.
+    /// Returns by task the fitness of the last elite that `archive.keep` keeps; `None` while all
+    /// are kept or there are fewer. It never decreases, so a robot at or below it can never enter
+    /// later: early stop and known bodies stay lossless.
     fn admission_thresholds(&self) -> Vec<Option<f64>> {
         let keep = self.options.config.archive.keep;
         let last = |name: String| self.search.archive().nth_fittest(keep?, |robot| robot.task == name);
         self.grouping.tasks().iter().map(|task| last(task.name())).collect()
     }
 
-    /// Coordinates of the cell of a robot that performs a task.
+    /// Returns the coordinates of the cell of a robot that performs a task.
     fn cell(&self, mut bins: Vec<usize>, task: usize) -> Vec<usize> {
         bins.extend((self.grouping.tasks().len() > 1).then_some(task));
         bins
     }
 
-    /// Counts so far, with the time of this session.
+    /// Returns the counts so far, including the time of this session.
     fn totals(&self) -> Totals {
         Totals { seconds: self.totals.seconds + self.began.elapsed().as_secs_f64(), ..self.totals }
     }
@@ -487,7 +479,7 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// The run as it is now.
+    /// Returns the run in its current state.
     fn file(&self) -> RunFile {
         RunFile {
             format: FORMAT.to_string(),
@@ -507,16 +499,16 @@ impl<'a> Run<'a> {
     }
 }
 
-/// How robots vary: random immigrants and mutated offspring, each from a random stream of its own.
+/// Random immigrants and mutated offspring, each from a random stream of its own.
 struct Mutations<'a> {
     seed: u64,
     spec: BodySpec,
     params: &'a MutationParams,
-    /// Once set, no more are made.
+    /// Makes no more robots once it is stopped.
     session: &'a Session<'a>,
 }
 
-/// A robot that has not walked yet.
+/// Returns a robot without results.
 fn unevaluated((genome, body): (Genome, Body), generation: u64, parent: Option<&Robot>) -> Robot {
     Robot {
         id: genome.id(),
@@ -532,7 +524,7 @@ fn unevaluated((genome, body): (Genome, Body), generation: u64, parent: Option<&
     }
 }
 
-/// Why there is no robot.
+/// Converts the error of a robot that could not be made.
 fn unmade(error: GenomeError) -> Error {
     match error {
         GenomeError::Stopped(stopped) => stopped.into(),

@@ -1,4 +1,4 @@
-//! Robots are shown held-out images, as in the paper's test: each in a fresh rollout.
+//! Evaluation of robots on held-out images, each in a fresh rollout, as in the paper's test.
 
 use crate::base::Grid;
 use crate::base::error::Error;
@@ -15,30 +15,28 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Actuation cycles per image in the paper's test.
 pub const CYCLES: u32 = 10;
 
-/// Control steps of this number of actuation cycles.
+/// Converts actuation cycles to control steps.
 pub(crate) fn control_steps(config: &Config, cycles: u32) -> u32 {
     cycles.saturating_mul(config.physics.cycle_steps)
 }
 
-/// The recognition task a robot performs; none if it always walks the same way.
+/// Returns the recognition task that a robot performs; `None` if it always walks the same way.
 pub(crate) fn task_of<'a>(grouping: &'a Grouping, robot: &Robot) -> Option<&'a grouping::Split> {
     grouping.tasks().iter().find(|split| split.is_called(&robot.task) && !split.is_same_way())
 }
 
-/// Shows images to robots.
 pub(crate) struct HeldOutRun<'a> {
     pub config: &'a Config,
-    /// Of one showing.
+    /// Control steps per image.
     pub control_steps: u32,
     pool: &'a rayon::ThreadPool,
     pub session: &'a Session<'a>,
-    /// Showings so far.
+    /// Rollouts so far.
     done: AtomicU64,
 }
 
 impl<'a> HeldOutRun<'a> {
-    /// Of robots of a config, each image for so many control steps; `done` rollouts were counted
-    /// before.
+    /// Evaluates robots of a config for this many control steps per image, after `done` rollouts.
     pub fn new(
         config: &'a Config,
         control_steps: u32,
@@ -49,8 +47,7 @@ impl<'a> HeldOutRun<'a> {
         Ok(HeldOutRun { config, control_steps, pool, session, done: AtomicU64::new(done) })
     }
 
-    /// A validation begins: number of robots, of images for the best of them, and of simulations in
-    /// all.
+    /// Announces a validation. `images` counts those of the best robots, `showings` all rollouts.
     pub fn validating(&self, robots: usize, images: usize, showings: u64) {
         let label = format!(
             "validating {} on up to {}:",
@@ -60,9 +57,9 @@ impl<'a> HeldOutRun<'a> {
         self.session.observer.begins(&Work::new(label, showings, "rollouts"));
     }
 
-    /// The displacement under each image (`None`: unstable), and the number of rollouts it took:
-    /// images that show the sensors the same pixels share a rollout. `None` if stopped before the
-    /// end.
+    /// Returns the displacement under each image (`None`: unstable) and the number of rollouts.
+    /// Images with the same pixels at the sensors share a rollout. Returns `None` if it was
+    /// stopped.
     pub fn rollouts(&self, robot: &Robot, stimuli: &[Grid<f64>]) -> Option<(Vec<Option<f64>>, usize)> {
         let HeldOutRun { config, session, done, .. } = self;
         let protocol = Protocol {

@@ -1,5 +1,4 @@
-//! The evolution of bodies and the training of gaits: ask, score, tell; resume; choice on
-//! validation images.
+//! The evolution of bodies, resuming it, and the choice of robots on validation images.
 
 pub mod evolve;
 pub mod held_out_run;

@@ -1,5 +1,4 @@
-//! Robots for commands that look at them one by one (`replay`, `plot`): which they are, and of
-//! which archives.
+//! Selects robots for commands that handle them one by one (`replay`, `plot`).
 
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
@@ -12,33 +11,33 @@ use crate::store::run::{Robot, different};
 use crate::store::validation::Validated;
 use std::path::PathBuf;
 
-/// Which robots, and of which archives.
+/// The robots to select, and the archives to search.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Which of them.
+    /// Robots to select.
     pub robots: Selection,
-    /// The archives, which are one crowd; none: the published robots if those are named, else the
+    /// Archives, searched as one; if empty, the published robots if those are named, else the
     /// newest run.
     pub archives: Vec<PathBuf>,
-    /// Whether only robots will do that an audit found physical.
+    /// True if only robots count that an audit found physical.
     pub physical_only: bool,
-    /// Seed of what is drawn.
+    /// Seed of random selections.
     pub seed: u64,
 }
 
 /// A robot, by name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Named {
-    /// The archive it is of.
+    /// Its archive.
     pub archive: PathBuf,
     /// Its id, the beginning of one, or "best".
     pub robot: String,
 }
 
-/// The robots that are selected. What is named of one archive is not looked for yet.
+/// Returns the selected robots. Names in a single archive are not looked up yet.
 ///
 /// # Errors
-/// If there are none such, or a signal stopped the search for the best on validation images.
+/// Returns an error if no robot matches, or if a signal stopped the validation.
 pub fn named(options: &Options, session: &Session) -> Result<Vec<Named>, Error> {
     let Options { seed, .. } = options;
     let (archives, robots) = robots::archives(options.archives.clone(), options.robots.clone())?;
@@ -62,14 +61,14 @@ pub fn named(options: &Options, session: &Session) -> Result<Vec<Named>, Error> 
     Ok(all)
 }
 
-/// The best of each task of a run on validation images, this many.
+/// Returns the best `count` of each task of a run on validation images.
 fn ranked<'a>(
     options: &Options,
     source: &'a StoredRun,
     count: usize,
     session: &Session,
 ) -> Result<Vec<(&'a Robot, Validated)>, Error> {
-    // Some will not be physical: then among those that are known at the run's end.
+    // Some may not be physical: validate as many as the run does at its end.
     let known = if options.physical_only { source.run.config.validation.best } else { 0 };
     let search = validation::Options { archive: source.path.clone(), best: Some(count.max(known)) };
     let Some(best) = validation::validate(&search, session)? else {

@@ -1,5 +1,5 @@
-//! Going on with a saved run: from its own checkpoint, or from its `run.json` where that says
-//! enough, under the same config, on the same images.
+//! Resuming a saved run under the same config and on the same images: from its checkpoint or, where
+//! that is sufficient, from its `run.json` alone.
 
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
@@ -13,12 +13,12 @@ use crate::store::names::{METRICS, RUN_JSON};
 use crate::store::run::RunFile;
 use std::path::Path;
 
-/// What to go on from; `None` if there is no run in the folder yet. A broken newest checkpoint is
-/// passed over, and a `run.json` without checkpoints gone on from; both are said with `warn`.
+/// Returns the state to resume from; `None` if the folder has no run yet. Skips a broken newest
+/// checkpoint and resumes from a `run.json` without checkpoints; `warn` reports either.
 ///
 /// # Errors
-/// If there are only broken checkpoints, or none beside a `run.json` that cannot do without, or the
-/// run is another one; nothing is changed.
+/// Returns an error, and changes nothing, if all checkpoints are broken, if there is none and the
+/// `run.json` is not sufficient, or if the run is another one.
 pub(crate) fn saved(
     folder: &RunFolder,
     config: &Config,
@@ -63,12 +63,12 @@ pub(crate) fn saved(
     Ok(Some(saved))
 }
 
-/// A checkpoint out of a `run.json` alone. Its elites are all that later generations depend on: a
-/// body that was evaluated before and is no elite can be none when it is evaluated again. Not so
-/// where a response is measured: of gaits that differ in their sensors only, the first stays.
+/// Builds a checkpoint from a `run.json` alone. Later generations depend only on its elites: a body
+/// that was evaluated before and is no elite would not become one now. A measured response is an
+/// exception: of gaits that differ only in sensors, the first stays.
 ///
 /// # Errors
-/// If it cannot be read, its fitness is a response, or it is of a training.
+/// Returns an error if it is unreadable, if its fitness is a response, or if it is a training.
 fn without_checkpoint(path: &Path) -> Result<Checkpoint, Error> {
     let run = RunFile::read(path)?;
     let needs = if run.origin.is_some() {
@@ -89,8 +89,7 @@ fn without_checkpoint(path: &Path) -> Result<Checkpoint, Error> {
     Ok(Checkpoint { run, totals: Totals::default(), known_bodies })
 }
 
-/// Whether a saved run can be gone on with under a config: all that its results depend on must be
-/// the same.
+/// Checks that a run can resume under a config: everything its results depend on must match.
 fn compatible(saved: &Checkpoint, config: &Config, training: &Training) -> Result<(), Error> {
     let differs = |text: String| {
         Error::input(text).advice("resume with the config it was started with").remedy(Remedy::Replace)
@@ -105,7 +104,7 @@ fn compatible(saved: &Checkpoint, config: &Config, training: &Training) -> Resul
             .remedy(Remedy::Replace));
     }
     let differing = differing(&saved.run.config.settings(), &config.settings());
-    // No evolution depends on how its gaits are trained when it has ended.
+    // Training keys only matter after the evolution has ended.
     if let Some((key, theirs, ours)) = differing.iter().find(|(key, ..)| !key.starts_with("train.")) {
         let text = format!("the run in this folder has another config: {key} = {theirs} there, {ours} now");
         return Err(differs(text));

@@ -1,8 +1,8 @@
 //! Choosing robots by their answers to images that are neither training nor test images.
 //!
-//! [`held_out`](crate::images::held_out) says which images. Robots are screened in rounds: all on a
-//! tenth of them, the better third of each task on three tenths, the better tenth on all. Results
-//! are kept beside the run.
+//! [`held_out`](crate::images::held_out) draws the images. Robots are screened in rounds: all on a
+//! tenth of them, the better third of each task on three tenths, the better tenth on all. The
+//! results are kept beside the run.
 
 use crate::base::error::{Error, ErrorKind};
 use crate::base::files::write_atomically;
@@ -29,48 +29,48 @@ use std::collections::BTreeMap;
 use std::mem::replace;
 use std::path::{Path, PathBuf};
 
-/// A round of the choice: robots of a task that are shown more images than before.
+/// A screening round: fewer robots of a task than before, on more images.
 struct Round {
-    /// Share of the images that are shown.
+    /// Fraction of the images used.
     image_share: f64,
-    /// Share of the robots of each task that get so far.
+    /// Fraction of the robots of each task that take part.
     robot_share: f64,
 }
 
-/// With fewer images in the first round, good robots are lost to chance; with more, the choice takes longer.
+/// With fewer images in round one, good robots are lost by chance; with more, it takes longer.
 const ROUNDS: [Round; 3] = [
     Round { image_share: 0.1, robot_share: 1.0 },
     Round { image_share: 0.3, robot_share: 1.0 / 3.0 },
     Round { image_share: 1.0, robot_share: 0.1 },
 ];
 
-/// How robots are to be chosen.
+/// The settings of a choice.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wanted {
-    /// So many of each task.
+    /// Number of robots of each task.
     pub count: usize,
-    /// Images in all.
+    /// Number of images in total.
     pub images: usize,
-    /// The argument that asks for that many; `None`: the config does.
+    /// Command-line argument that set `images`; `None` if the config did.
     pub argument: Option<&'static str>,
-    /// Displacements up to this count as wrong \[voxel lengths\].
+    /// Threshold up to which displacements count as wrong \[voxel lengths\].
     pub threshold: f64,
 }
 
-/// Which robots of a run are to be chosen.
+/// The run to choose from, and the number of robots.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// The run.json.
+    /// Path of the run.json.
     pub archive: PathBuf,
-    /// How many of each task; `None`: as the config says.
+    /// Number of robots of each task; `None`: that of the config.
     pub best: Option<usize>,
 }
 
-/// Chooses the best robots of a run on the images of its section `[validation]`, as `eval` does it,
-/// and keeps them beside the run; `None` if stopped.
+/// Chooses the best robots of a run on its `[validation]` images, evaluated as by `eval`, and keeps
+/// them beside the run; `None` if stopped.
 ///
 /// # Errors
-/// What is wrong with run or data, or that there are not enough images.
+/// Returns an error if run or data is unsuitable, or if there are not enough images.
 pub fn validate(options: &Options, session: &Session) -> Result<Option<Vec<Validated>>, Error> {
     let source = StoredRun::read(&options.archive)?;
     let config = &source.run.config;
@@ -80,11 +80,10 @@ pub fn validate(options: &Options, session: &Session) -> Result<Option<Vec<Valid
     ranked(&source, count, &dataset, session)
 }
 
-/// The same when a run ends, for as many robots as its config asks for, on data that are loaded
-/// already.
+/// Chooses as many robots as the config of a finished run wants, with data already loaded.
 ///
 /// # Errors
-/// As of [`validate`].
+/// As [`validate`].
 pub(crate) fn at_end(
     archive: &Path,
     dataset: &Dataset,
@@ -113,11 +112,11 @@ fn ranked(
     Ok(best.map(|best| best.into_iter().map(|(_, validated)| validated).collect()))
 }
 
-/// The best of each run and task among some robots, or the best physical ones if the selection says
-/// so, with how they did; `None` if stopped.
+/// Returns the best robots of each run and task, or the best physical ones if selected, with their
+/// results; `None` if stopped.
 ///
 /// # Errors
-/// As of [`best`] and [`first_physical`].
+/// As [`best`] and [`first_physical`].
 pub(crate) fn chosen<'a>(
     sources: &'a [StoredRun],
     robots: &[Chosen<'a>],
@@ -131,8 +130,7 @@ pub(crate) fn chosen<'a>(
     for (number, source) in sources.iter().enumerate() {
         let own = robots.iter().filter(|chosen| chosen.source == number).map(|chosen| chosen.robot).collect();
         let is_physical = matches!(selection, Selection::Physical(_));
-        // Among those that are known at the run's end, in any case, since some will not be
-        // physical.
+        // Some may not be physical: validate as many as the run does at its end.
         let count =
             if is_physical { wanted.count.max(source.run.config.validation.best) } else { wanted.count };
         let searched = Wanted { count, ..*wanted };
@@ -145,11 +143,10 @@ pub(crate) fn chosen<'a>(
     Ok(Some(all))
 }
 
-/// The best of each task among some robots of a run, best first, with how they did; `None` if
-/// stopped.
+/// Returns the best robots of each task of a run, best first, with results; `None` if stopped.
 ///
 /// # Errors
-/// If there are not enough images, or the result cannot be kept.
+/// Returns an error if there are not enough images, or if the result cannot be kept.
 pub(crate) fn best<'a>(
     source: &'a StoredRun,
     dataset: &Dataset,
@@ -160,7 +157,7 @@ pub(crate) fn best<'a>(
 ) -> Result<Option<Vec<(&'a Robot, Validated)>>, Error> {
     let run = &source.run;
     let images = images(&[run], dataset, wanted.argument, wanted.images)?;
-    // With fewer asked for than the end of the run has found, the first of those.
+    // If fewer are wanted than the run chooses at its end, return the first of those.
     let searched = &Wanted { count: wanted.count.max(run.config.validation.best), ..*wanted };
     let shown = (dataset.fingerprint(Split::Train).expect("its images were drawn just now"), &images[..]);
     let key = key(run, &robots, searched, shown, walker.control_steps);
@@ -207,7 +204,7 @@ pub(crate) fn best<'a>(
     Ok(Some(found))
 }
 
-/// Whether robots are chosen as the run's config says: from all that it has.
+/// Returns true if all robots of a run are validated with the settings of its config.
 fn is_own(run: &RunFile, robots: &[&Robot], wanted: &Wanted, control_steps: u32) -> bool {
     let ValidationConfig { images, best } = run.config.validation;
     let Ok(grouping) = run.config.grouping() else { return false };
@@ -219,7 +216,7 @@ fn is_own(run: &RunFile, robots: &[&Robot], wanted: &Wanted, control_steps: u32)
         && robots.len() == all
 }
 
-/// Of all that the result depends on.
+/// Hashes everything that the result depends on.
 fn key(
     run: &RunFile,
     robots: &[&Robot],
@@ -240,8 +237,7 @@ fn key(
     )
 }
 
-/// Robots and images of each round, for some robots of a task of which `count` are wanted; of each
-/// class, which take turns, an image or more.
+/// Returns the numbers of robots and images in each round; classes alternate, so each has an image.
 fn rounds(robots: usize, count: usize, (images, classes): (usize, usize)) -> [(usize, usize); 3] {
     ROUNDS.map(|Round { image_share, robot_share }| {
         let kept = ((robots as f64 * robot_share).ceil() as usize).max(count).min(robots);
@@ -274,7 +270,7 @@ fn screened(
     walker.validating(robots.len(), images.len(), showings.sum::<usize>() as u64);
     let mut chosen = Vec::new();
     for (_, all) in tasks {
-        // With its displacements so far.
+        // Pairs each robot with its displacements so far.
         let mut left: Vec<_> = all.iter().map(|robot| (*robot, Vec::new())).collect();
         let mut scores = Vec::new();
         for (keep, shown) in rounds(all.len(), count, of) {
@@ -289,7 +285,8 @@ fn screened(
                 let trial = Trial { run, robot, split, images: &images[..shown], threshold };
                 scores.push((robot, RobotReport::new(&trial, displacements, 0)));
             }
-            // Stable: equals stay in the order of the round before, at first of their fitness.
+            // The sort is stable: ties keep the order of the round before, at first that of
+            // fitness.
             scores.sort_by(|(_, a), (_, b)| b.balanced_accuracy.total_cmp(&a.balanced_accuracy));
             left = scores.iter().map(|(robot, report)| (*robot, report.displacements.clone())).collect();
         }

@@ -1,5 +1,5 @@
-//! The atlas: runs that are in the repository, compressed, and not in the program. A path that
-//! begins with [`PREFIX`] names them: `atlas:zero_one-1` one, `atlas:zero_one` one of every seed.
+//! The atlas: compressed runs in the repository, outside the program. A path with [`PREFIX`] names
+//! one run (`atlas:zero_one-1`) or those of all seeds (`atlas:zero_one`).
 
 use std::ffi::OsStr;
 use std::io;
@@ -11,14 +11,13 @@ pub const PREFIX: &str = "atlas:";
 /// Environment variable with the folder of the atlas.
 pub const VARIABLE: &str = "MORPHCOG_ATLAS";
 
-/// Second place to look for it: the repository's folder.
+/// Folder of the atlas in the repository, searched second.
 const FOLDER: &str = "data/atlas";
 
 /// Suffix of the names of compressed files.
 const COMPRESSED: &str = ".gz";
 
-/// Returns the folders in which the atlas may be, in order; `variable` is the value of
-/// `MORPHCOG_ATLAS`.
+/// Returns the folders to search, in order; `variable` is the value of `MORPHCOG_ATLAS`.
 fn folders(variable: Option<&OsStr>) -> Vec<PathBuf> {
     let set = variable.filter(|value| !value.is_empty()).map(PathBuf::from);
     set.into_iter().chain([PathBuf::from(FOLDER)]).collect()

@@ -1,17 +1,15 @@
-//! Runs that ship with the program, if built with the feature `gallery`. A path that begins with
-//! [`PREFIX`] names them: `gallery:zero_one-1` one, `gallery:zero_one` all of a set. Their files
-//! are read as if they were in a folder of that name.
+//! Runs that ship with the program if it has the feature `gallery`. A path with [`PREFIX`] names
+//! one run (`gallery:zero_one-1`) or a set (`gallery:zero_one`), and is read like a folder.
 
 use std::path::{Path, PathBuf};
 
 /// Prefix of the names of shipped runs.
 pub const PREFIX: &str = "gallery:";
 
-/// The run of the robots that the paper's authors published. It has no files:
-/// `robots::published` makes it from their list.
+/// The run of the published robots. It has no files: `robots::published` builds it from a list.
 pub const PUBLISHED: &str = "gallery:";
 
-/// Robots that tell zeros from ones, the best run first: what is shown where there are no others.
+/// Robots that tell zeros from ones, best run first; the default where there are no other runs.
 pub const ZERO_ONE: &str = "gallery:zero_one";
 
 /// A robot for each pair of digits; together they answer as a team.
@@ -52,7 +50,6 @@ macro_rules! tasks {
     };
 }
 
-/// This build has no shipped runs.
 #[cfg(not(feature = "gallery"))]
 const SETS: &[Set] = &[];
 
@@ -123,7 +120,7 @@ fn runs_of(sets: &[Set], name: &str) -> Result<Vec<PathBuf>, String> {
         sets.iter().flat_map(of_set).map(|run| PathBuf::from(format!("{run}/run.json"))).collect();
     match found.is_empty() {
         true => {
-            // Each set with one of its runs as an example.
+            // Each set is listed with one of its runs as an example.
             let names: Vec<String> = sets.iter().map(|(set, runs)| format!("{set}, {}", runs[0].0)).collect();
             Err(format!("there is no {name}: expected {ALL}, {}", names.join(", ")))
         }

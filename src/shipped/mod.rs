@@ -1,6 +1,5 @@
-//! Runs identified by a name instead of a path: those that ship with the program
-//! (`gallery:zero_one-1`), and those of the atlas (`atlas:zero_one-1`). Their results go to the
-//! current folder.
+//! Runs identified by a name instead of a path: shipped runs (`gallery:zero_one-1`) and those of
+//! the atlas (`atlas:zero_one-1`). Their results go to the current folder.
 
 pub mod atlas;
 pub mod gallery;
@@ -11,15 +10,15 @@ use flate2::read::MultiGzDecoder;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Where the text of a file of a named run is.
+/// The place of a named run's file.
 enum Place {
     /// In the program.
     Shipped(&'static str),
-    /// In this file, compressed by gzip.
+    /// In a file, compressed with gzip.
     Compressed(PathBuf),
 }
 
-/// Splits a path into the name of a run (`gallery:zero_one-1`) and its file; none for other paths.
+/// Splits a path into a run's name (`gallery:zero_one-1`) and its file; `None` for other paths.
 fn parts(path: &Path) -> Option<(&str, &str)> {
     let text = path.to_str()?;
     let (name, file) = text.split_once(['/', '\\']).unwrap_or((text, ""));
@@ -42,14 +41,13 @@ pub fn set(path: &Path) -> Option<(&str, &str)> {
     Some((of, run.rsplit_once('-')?.0))
 }
 
-/// Returns the atlas folder that has a named run; none for other paths.
+/// Returns the atlas folder that has a named run; `None` for other paths.
 pub fn atlas_of(path: &Path) -> Option<PathBuf> {
     let (name, _) = parts(path)?;
     atlas::folder_of(name.strip_prefix(atlas::PREFIX)?)
 }
 
-/// Returns the place of a file of a named run; `None` for other paths, and if nothing of that name
-/// ships with the program.
+/// Returns the place of a named run's file; `None` for other paths, and for unknown shipped files.
 fn place(path: &Path) -> Option<io::Result<Place>> {
     let (name, file) = parts(path)?;
     match name.strip_prefix(atlas::PREFIX) {
@@ -61,7 +59,7 @@ fn place(path: &Path) -> Option<io::Result<Place>> {
 /// Reads a text file of a run, named or on the disk.
 ///
 /// # Errors
-/// As [`files::read_text`]; if the atlas has no such file, with what to do.
+/// As [`files::read_text`]; if the atlas lacks the file, the error says what to do.
 pub fn read_text(path: &Path) -> io::Result<String> {
     match place(path).transpose()? {
         Some(Place::Shipped(text)) => Ok(text.to_string()),
@@ -70,12 +68,12 @@ pub fn read_text(path: &Path) -> io::Result<String> {
     }
 }
 
-/// Returns true if there is such a file, of a named run or on the disk.
+/// Returns true if a file exists, of a named run or on the disk.
 pub fn exists(path: &Path) -> bool {
     place(path).map_or_else(|| path.exists(), |place| place.is_ok())
 }
 
-/// The `run.json` of every run that a name means.
+/// Returns the `run.json` of every run that a name stands for.
 ///
 /// # Errors
 /// Returns an error that lists the shipped runs if none of them has that name.

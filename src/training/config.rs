@@ -1,4 +1,4 @@
-//! The config of a training: that of its gaits with another task, and as many images as there are.
+//! The config of a training: that of its gaits, with another task and as many images as possible.
 
 use crate::base::error::Error;
 use crate::base::session::Session;
@@ -20,11 +20,11 @@ use crate::task::stimulus::StimulusParams;
 /// Least number of training images of a class.
 const LEAST_PER_CLASS: usize = 2;
 
-/// The config of the run that is made: that of the walkers' run with another task, perhaps another
-/// seed, and the keys that are set.
+/// Builds the config of a training: that of the gaits' run with another task, perhaps another seed,
+/// and the keys in `set`.
 ///
 /// # Errors
-/// What is wrong with these.
+/// Returns an error if the config is invalid, or sets something that a training fixes.
 pub(crate) fn config_of(
     of_walkers: &Config,
     groups: &[Vec<u8>; 2],
@@ -64,8 +64,8 @@ pub(crate) fn config_of(
     Ok(config)
 }
 
-/// Checks that designs are compared on an image of every class: both groups take turns, of which the
-/// first begins.
+/// Checks that designs are compared on an image of every class. The groups alternate; the first
+/// begins.
 fn enough(config: &Config, [a, b]: &[Vec<u8>; 2]) -> Result<(), Error> {
     let (found, least) = (config.train.final_images, (2 * a.len()).saturating_sub(1).max(2 * b.len()));
     match found < least {
@@ -77,7 +77,7 @@ fn enough(config: &Config, [a, b]: &[Vec<u8>; 2]) -> Result<(), Error> {
     }
 }
 
-/// Whether a config has what trainings have, and nothing in its place.
+/// Checks that no key overrides a setting that every training fixes.
 fn fixed(config: &Config, asked: &Config) -> Result<(), Error> {
     let fixed = [
         ("generations", config.generations != asked.generations, "has rounds and challengers"),
@@ -95,9 +95,9 @@ fn fixed(config: &Config, asked: &Config) -> Result<(), Error> {
     }
 }
 
-/// The same for a dataset: a margin that was not asked for, but is that of the gaits' own images, is
-/// left out where those have another size. `of_gaits` is what the gaits' config says, and
-/// `their_data` which data those are.
+/// Drops the margin inherited from the gaits' config if the new images have another size, unless
+/// `set` asks for it. `of_gaits` is the gaits' config; `their_data` is the dataset they were
+/// trained on.
 pub(crate) fn sized(
     config: Config,
     their_data: &DatasetRef,
@@ -131,11 +131,11 @@ pub(crate) fn sized(
     }
 }
 
-/// The same with as many training images as there are beside those that validate; of few images
-/// fewer validate than the config asks for, too. `before`: what the gaits were trained on.
+/// Sets the number of training images to as many as validation leaves. If there are few, validation
+/// also uses fewer than configured. `before` holds the images the gaits were trained on.
 ///
 /// # Errors
-/// If there are too few to train on, or to validate with.
+/// Returns an error if too few images remain for training or validation.
 pub(crate) fn with_images(
     config: Config,
     before: &[usize],
@@ -151,7 +151,7 @@ pub(crate) fn with_images(
     if best > 0 && fewest - per_class < wanted {
         per_class = per_class.min((fewest * 2 / 3).max(1));
         let there = (fewest - per_class).min(wanted) * classes.len();
-        // What was asked for by a number of one's own is kept, or refused.
+        // A number of validation images that the user chose is kept or refused, never reduced.
         let is_asked = images != ValidationConfig::default().images;
         if !is_asked && (LEAST..images).contains(&there) {
             session
@@ -167,20 +167,19 @@ pub(crate) fn with_images(
     Ok(config)
 }
 
-/// Checks that the text of two groups means nothing else with the classes of a dataset.
+/// Checks that the text of two groups is unambiguous given the classes of a dataset.
 ///
 /// # Errors
-/// If it does; what to write.
+/// If it is ambiguous, the error says what to write.
 pub(crate) fn check_groups(groups: &Groups, dataset: &Dataset) -> Result<(), Error> {
     let there = dataset.classes(Split::Train);
     groups.check_among(&there).map_err(|error| Error::usage(error.to_string()))
 }
 
-/// Whether a run's gaits, when they have evolved, can be trained to tell these groups apart: to be
-/// known before they evolve.
+/// Checks before a run evolves that its gaits can later be trained on these groups.
 ///
 /// # Errors
-/// If the config, or the images there are, do not allow it.
+/// Returns an error if the config or the available images do not allow it.
 pub fn check(evolved: &Config, groups: &[Vec<u8>; 2], whereabouts: &Whereabouts) -> Result<(), Error> {
     let config = config_of(evolved, groups, None, &[])?;
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;

@@ -1,4 +1,4 @@
-//! The gaits that a training tries, and what is known of them before.
+//! The gaits that a training tries, and the rollouts known beforehand.
 
 use crate::base::error::Error;
 use crate::base::hash::sha256_hex;
@@ -21,13 +21,13 @@ use crate::store::training::{Batch, Drawn, Elsewhere, Origin};
 use crate::task::protocol::{Protocol, RolloutMode};
 use std::collections::BTreeSet;
 
-/// A gait to be tried.
+/// A candidate gait and the robot it belongs to.
 pub(super) struct Walker<'a> {
     pub(super) robot: &'a Robot,
     pub(super) gait: Gait,
 }
 
-/// Where the walkers are from, and what they were trained on: not for validation.
+/// Returns the origin of the gaits, with the images they were trained on; those cannot validate.
 pub(super) fn origin(source: &StoredRun, config: &Config, dataset: &Dataset) -> Result<Origin, Error> {
     let run = &source.run;
     let sha256 = dataset.fingerprint(Split::Train).expect("a training loads its training images");
@@ -37,7 +37,7 @@ pub(super) fn origin(source: &StoredRun, config: &Config, dataset: &Dataset) -> 
     let mut trained_on = BTreeSet::new();
     match sha256 == run.dataset.train_sha256 {
         true => trained_on = held_out::trained_on(run, dataset)?,
-        // Some day it may be trained on that data again.
+        // A later training may use that data again.
         false => elsewhere.push(Elsewhere::of(run)),
     }
     for earlier in here {
@@ -57,7 +57,6 @@ pub(super) fn origin(source: &StoredRun, config: &Config, dataset: &Dataset) -> 
     })
 }
 
-/// The gaits of the chosen robots, each once.
 pub(super) fn walkers<'a>(
     source: &'a StoredRun,
     robots: &Selection,
@@ -80,8 +79,8 @@ pub(super) fn walkers<'a>(
     Ok(walkers)
 }
 
-/// What `morphcog response` measured of each gait, where it lies beside the run and holds for this
-/// training: what would be simulated again otherwise.
+/// Returns the rollouts of each gait that `morphcog response` measured, to save simulating them
+/// again. They are empty unless a file beside the run is valid for this training.
 pub(super) fn measured(
     source: &StoredRun,
     config: &Config,
@@ -90,11 +89,11 @@ pub(super) fn measured(
     session: &Session,
 ) -> Vec<Batch> {
     let nothing = || vec![Vec::new(); walkers.len()];
-    // That of a named run is in the present folder, if it was measured.
+    // If the response of a named run was measured, it is in the current folder.
     let made = folder::beside(&source.path, RESPONSE_JSON);
     let path = if made.exists() { made } else { source.path.with_file_name(RESPONSE_JSON) };
     let of_run = &source.run.config;
-    // A response is measured in fresh rollouts.
+    // Responses are measured in fresh rollouts.
     let protocol = Protocol { rollout: RolloutMode::Fresh, ..of_run.protocol.clone() };
     if (&config.physics, &config.protocol) != (&of_run.physics, &protocol) {
         return nothing();
@@ -104,7 +103,7 @@ pub(super) fn measured(
     walkers.iter().map(|walker| file.known(&run, seed, conditions, &walker.gait).0.to_vec()).collect()
 }
 
-/// Of all that rollouts depend on; more challengers come after those that there were.
+/// Hashes all that rollouts depend on, but not the challengers: more of them only add rollouts.
 pub(super) fn key(config: &Config, seed_of_gaits: u64, walkers: &[Walker], training: &Training) -> String {
     let bodies: Vec<String> = walkers.iter().map(|walker| walker.robot.body.to_string()).collect();
     let images: Vec<usize> = training.images.iter().map(|image| image.index).collect();

@@ -1,4 +1,4 @@
-//! What a training simulates, kept in `training.json`, so that one that goes on has it again.
+//! The rollouts of a training, kept in `training.json`, so that a resumed training can reuse them.
 
 use crate::base::Grid;
 use crate::base::error::Error;
@@ -18,27 +18,26 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// How often the rollouts are saved. A power cut costs as much.
+/// Interval at which rollouts are saved. A power cut loses at most this much work.
 const SAVE_EVERY: Duration = Duration::from_secs(5);
 
-/// Rollouts a thread that are simulated before it is looked whether they are to be saved. Fewer let
-/// threads wait for each other more often, and leave fewer to be simulated side by side.
+/// Rollouts per thread between two checks of the time to save. With fewer, threads wait for each
+/// other more often, and fewer rollouts are simulated side by side.
 const PART: usize = 128;
 
-/// What is simulated, and was in sessions before.
+/// The rollouts simulated in this session and in earlier ones.
 pub(super) struct Log<'a> {
     path: PathBuf,
     key: String,
     batches: Vec<Batch>,
-    /// Batches asked for so far.
+    /// Batches requested so far; `simulated` counts their rollouts.
     asked: usize,
-    /// Rollouts in them.
     pub(super) simulated: usize,
-    /// Rollouts that are in the file, and when it was written.
+    /// Number of rollouts in the file, and the time it was written.
     saved: (usize, Instant),
-    /// Rollouts of the work that began last; none if others are counted than rollouts.
+    /// Rollouts completed in the current work; `None` if its progress has another unit.
     done: Option<AtomicU64>,
-    /// Whether anything was simulated since it was looked at last.
+    /// True if anything was simulated since the last check.
     pub(super) has_simulated: Arc<AtomicBool>,
     pub(super) session: &'a Session<'a>,
 }
@@ -68,13 +67,13 @@ impl<'a> Log<'a> {
         Ok(Log { path, key, batches, asked: 0, simulated: 0, saved, done: None, has_simulated, session })
     }
 
-    /// Work begins whose rollouts are counted.
+    /// Starts work whose progress is counted in rollouts.
     pub(super) fn begins(&mut self, label: String, rollouts: usize) {
         self.session.observer.begins(&Work::new(label, rollouts as u64, "rollouts"));
         self.done = Some(AtomicU64::new(0));
     }
 
-    /// A round begins, or, where there are none, the look at the robot as it is.
+    /// Starts a round or, if the plan has none, the evaluation of the robot as it is.
     pub(super) fn begins_round(&mut self, robot: &str, number: usize, plan: &Plan) {
         match plan.rounds {
             0 => self.begins(format!("{robot}: as it is:"), plan.images),
@@ -82,13 +81,13 @@ impl<'a> Log<'a> {
         }
     }
 
-    /// Work begins of which each challenger is told by itself.
+    /// Starts work whose progress is counted in challengers.
     pub(super) fn begins_challenges(&mut self, challengers: usize) {
         self.session.observer.begins(&Work::new("refining:".to_string(), challengers as u64, "challengers"));
         self.done = None;
     }
 
-    /// So many rollouts are done, of which `simulated` took time.
+    /// Reports `count` rollouts as done; only `simulated` of them took time.
     fn rolled(&self, count: u64, simulated: u64) {
         if simulated > 0 {
             self.has_simulated.store(true, Ordering::Relaxed);
@@ -99,7 +98,7 @@ impl<'a> Log<'a> {
         }
     }
 
-    /// Rollouts of a body under stimuli and conditions; the first are `known`.
+    /// Returns the rollouts of a body under stimuli and conditions; the first are `known`.
     pub(super) fn rollouts(
         &mut self,
         body: &Body,
@@ -115,7 +114,7 @@ impl<'a> Log<'a> {
                 self.rolled(batch.len() as u64, 0);
                 return Ok(batch.clone());
             }
-            // It was stopped within its last batch.
+            // The last session stopped during this batch.
             Some(batch) if batch.len() < stimuli.len() && number + 1 == self.batches.len() => {
                 self.batches.pop()
             }
@@ -129,7 +128,7 @@ impl<'a> Log<'a> {
         let setting = (&config.physics, &config.protocol);
         self.batches.push(begun.unwrap_or_else(|| known[..known.len().min(stimuli.len())].to_vec()));
         self.rolled(self.batches[number].len() as u64, 0);
-        // A part at a time: what is stopped goes on after the last one.
+        // Simulating part by part lets a stopped training resume after the last part.
         let part = PART * rayon::current_num_threads();
         while self.batches[number].len() < stimuli.len() {
             let begin = self.batches[number].len();
@@ -168,7 +167,7 @@ pub(super) fn stopped() -> Error {
     Error::stopped("stopped; what was simulated is saved".to_string()).remedy(Remedy::RepeatResuming)
 }
 
-/// Rollouts that are kept.
+/// Rollouts that are recorded in the log.
 pub(super) struct Kept<'a, 'b> {
     pub(super) config: &'a Config,
     pub(super) conditions: &'a [Condition],

@@ -1,8 +1,7 @@
-//! `morphcog train`: the gaits of an archive are taught to tell two groups of images apart.
+//! `morphcog train`: trains the gaits of an archive to tell two groups of images apart.
 //!
-//! [`teach`](crate::training::rounds) says how. Everything that is simulated is kept in `training.json`
-//! beside `run.json`; a training that goes on takes from there what was simulated before, so that
-//! it ends with the same bits.
+//! The method is described in [`rounds`]. Every rollout is kept in `training.json` beside
+//! `run.json`. A resumed training reuses them, so it ends with the same bits.
 
 mod config;
 mod gaits;
@@ -45,45 +44,45 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use trainer::Trainer;
 
-/// What to train and where to.
+/// The gaits to train, the task, and the output folder.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// The run.json whose robots walk.
+    /// Path of the run.json with the gaits.
     pub archive: PathBuf,
-    /// Which of them are tried; the one that can be taught most is taught.
+    /// Robots whose gaits are tried; the one with the best prediction is trained.
     pub robots: Selection,
     /// The two groups of classes.
     pub groups: Groups,
-    /// Seed of all chance; `None`: that of the run.
+    /// Seed of all random numbers; `None`: that of the run.
     pub seed: Option<u64>,
-    /// Keys of the config that differ from those of the run, as `train.rounds=10`.
+    /// Config keys that differ from those of the run, as `train.rounds=10`.
     pub set: Vec<String>,
-    /// Name of the run that is made.
+    /// Name of the new run.
     pub name: String,
     /// Its folder.
     pub out: PathBuf,
-    /// What to do if there is a run in it.
+    /// Action if the folder already has a run.
     pub if_exists: IfExists,
 }
 
-/// How a training ended.
+/// The result of a training.
 #[derive(Clone, Debug)]
 pub struct Finished {
-    /// The run as it stands in `run.json`.
+    /// The run as written to `run.json`.
     pub run: RunFile,
-    /// Rollouts simulated in all, validation left out.
+    /// Total number of rollouts simulated, without validation.
     pub rollouts: usize,
     /// Height and width of the training images.
     pub size: [usize; 2],
-    /// How the robot did on validation images; `None` if that was stopped.
+    /// Results on validation images; `None` if validation was stopped.
     pub validated: Option<Vec<Validated>>,
 }
 
-/// Trains a robot, and validates it.
+/// Trains a robot and validates it.
 ///
 /// # Errors
-/// What is wrong with archive, options, data or folder; that it was stopped (the same with
-/// [`IfExists::Resume`] goes on). Nothing that was there is lost.
+/// Returns an error if the archive, an option, the data or the folder is unsuitable, or if it was
+/// stopped ([`IfExists::Resume`] continues it). No existing results are lost.
 pub fn train(options: &Options, session: &Session) -> Result<Finished, Error> {
     if options.robots.validated().is_some() {
         let text = "expected another selection: gaits have no task to validate";
@@ -107,10 +106,10 @@ pub fn train(options: &Options, session: &Session) -> Result<Finished, Error> {
     training.conditions = config.train.perturbations.of(classes);
     let mut walkers = walkers(&source, &options.robots, config.seed)?;
     if config.train.rounds == 0 {
-        // One of them is refined as it is: the fittest, the first of several.
+        // Without rounds, one robot is refined as it is: the fittest, or the first of equals.
         walkers.sort_by(|a, b| b.robot.objective.total_cmp(&a.robot.objective));
     }
-    // A gait's response is the same for every task and every seed of a training.
+    // The seed is that of the gaits: a response holds for every task and training seed.
     let probing = Probing::new(&training.conditions, source.run.config.seed);
     let measured = measured(&source, &config, &probing, &walkers, session);
     let [log, run] = [TRAINING_JSON, RUN_JSON].map(|name| options.out.join(name));
@@ -138,7 +137,7 @@ pub fn train(options: &Options, session: &Session) -> Result<Finished, Error> {
     ));
     let trainer = Trainer { config: &config, dataset: &dataset, training: &training, probing, measured };
     let taught = pool.install(|| trainer.train(&walkers, &mut log, session));
-    // What was simulated is kept, however it ended.
+    // Rollouts are saved even after an error.
     log.save()?;
     let (walker, config, taught) = taught?;
     let run = run_file(options, &config, &training, origin, walker, &taught)?;
@@ -159,7 +158,7 @@ pub fn train(options: &Options, session: &Session) -> Result<Finished, Error> {
     Ok(Finished { run, rollouts: log.simulated, size, validated })
 }
 
-/// Whether a training has a folder of its own: that of its gaits would be lost.
+/// Checks that the output folder is not that of the gaits, whose run would be overwritten.
 fn apart(out: &Path, archive: &Path) -> Result<(), Error> {
     let of_gaits = archive.parent().map(|folder| Path::new(".").join(folder));
     let [out_now, of_gaits] =
@@ -171,7 +170,7 @@ fn apart(out: &Path, archive: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-/// The run with the robot that was taught.
+/// Builds the run file of the trained robot.
 fn run_file(
     options: &Options,
     config: &Config,

@@ -1,12 +1,12 @@
-//! Refining a taught robot: a hill climb over whole bodies on real rollouts.
+//! Refining a trained robot: a hill climb over whole bodies on real rollouts.
 //!
-//! What a model says ends where a body is not linear. So at the end of a training the best design
-//! is *champion*: it is shown a few hundred training images, after some challengers others, so that
-//! none wins by chance on these. Challengers differ from it in some sensors, chosen by the slopes
-//! and by how the champion really answered, or in a few voxels of any material. A challenger is
-//! shown the same images, and dropped as soon as it falls behind (racing; Maron & Moore 1994). One
-//! that is better by more than chance becomes champion. Every challenger with the champion's gait
-//! tells more of the slopes.
+//! A linear model fails where a body is not linear. So the best design ends a training as
+//! *champion*. It is evaluated on a few hundred training images, which change after some
+//! challengers so that none wins by chance on them. Challengers differ in some sensors, chosen by
+//! the slopes and by the champion's measured answers, or in a few voxels of any material. Each is
+//! evaluated on the same images and dropped as soon as it falls behind (racing; Maron & Moore
+//! 1994). It becomes champion if it is better by more than chance. Challengers with the champion's
+//! gait improve the slopes.
 
 use crate::base::Grid;
 use crate::base::random::{Purpose, Stream, stream};
@@ -19,54 +19,54 @@ use crate::sim::{Physics, width};
 use crate::task::fitness::clipped_margin;
 use crate::training::rounds::{Image, Rollouts};
 
-/// Images of the first look at a challenger; each next look takes twice as many. With fewer, good
-/// ones are dropped by chance; with more, bad ones cost more.
+/// Images in a challenger's first look; each next look takes twice as many. With fewer, good
+/// challengers are dropped by chance; with more, bad ones cost more.
 const FIRST_LOOK: usize = 24;
 
-/// By how many standard errors what is to come may be better than what was seen. Larger values drop
-/// later: with 2, three in four challengers of a hard task (3|012) are shown all 400 images.
+/// Standard errors by which the mean gain to come may exceed that so far. Larger values drop
+/// challengers later: with 2, three in four of a hard task (3|012) need all 400 images.
 const ERRORS_OF_HOPE: f64 = 1.0;
 
-/// By how many of its standard errors a challenger must be better. Every change of a body throws its
-/// answers near the boundary anew, so many that are worse look better on a few hundred images. With
-/// 0, they won by chance.
+/// Standard errors by which a challenger must be better. Any change of a body reshuffles its
+/// answers near the boundary, so many worse bodies look better on a few hundred images. With 0,
+/// they won by chance.
 const ERRORS_TO_WIN: f64 = 1.0;
 
-/// What few images may hide of the spread of gains. Without it, a challenger whose first answers
-/// are all the champion's is taken for its twin.
+/// Spread added to that of gains, which few images may understate. Without it, a challenger that
+/// first answers exactly like the champion is taken for its twin.
 const DOUBT: f64 = 0.05;
 
-/// Share of challengers that differ in voxels of any material; the others differ in sensors.
+/// Fraction of challengers that differ in voxels of any material; the others differ in sensors.
 const OTHER_GAITS: f64 = 0.4;
 
-/// Most places of a challenger that change when sensors do: 1, 2, 4, 8 or 16.
+/// Binary logarithm of the most sensors that change: 1, 2, 4, 8 or 16.
 const MOST_SENSORS: u32 = 4;
 
-/// Most voxels of a challenger that change when the gait does.
+/// Most voxels that change in a challenger with another gait.
 const MOST_VOXELS: usize = 3;
 
-/// What older evidence of the slopes counts when a champion is beaten.
+/// Factor on the older evidence of the slopes when the champion is beaten.
 const FADE: f64 = 0.9;
 
-/// Draws until a changed body is valid.
+/// Most draws of a changed body before the champion is copied for lack of a valid one.
 const DRAWS: usize = 1000;
 
 /// A training image of a refinement.
 #[derive(Clone, Debug)]
 pub struct WeightedImage {
-    /// What the voxels see.
+    /// Pixels at the voxels.
     pub stimulus: Grid<f64>,
-    /// The number of its condition.
+    /// Number of its condition.
     pub condition: usize,
-    /// 1 if the robot is to walk right, −1 if left.
+    /// Correct direction: 1 right, −1 left.
     pub right: f64,
-    /// What it weighs.
+    /// Weight in the fitness.
     pub weight: f64,
 }
 
 impl WeightedImage {
-    /// Images of a training, for a robot whose first group walks to this side: 1 right, −1 left.
-    /// Both groups weigh the same, however many images of each there are.
+    /// Prepares images for a robot whose first group walks to this side: 1 right, −1 left. Both
+    /// groups have the same total weight, however many images each has.
     pub fn all(images: &[&Image], side: f64) -> Vec<Self> {
         let of =
             |right: f64| images.iter().filter(|image| image.example.right == right).count().max(1) as f64;
@@ -80,22 +80,22 @@ impl WeightedImage {
     }
 }
 
-/// How a challenger did.
+/// The result of a challenge.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Challenge {
     /// Its number, from 1.
     pub number: usize,
-    /// Whether its gait is another one.
+    /// True if the challenger has another gait than the champion.
     pub other_gait: bool,
-    /// Images it was shown.
+    /// Number of images the challenger was evaluated on.
     pub shown: usize,
-    /// The champion's fitness after it.
+    /// The champion's fitness afterwards.
     pub fitness: f64,
-    /// Whether it is the champion now.
+    /// True if the challenger became champion.
     pub won: bool,
 }
 
-/// A champion and what is known of it.
+/// A champion, and the evidence from which challengers are proposed.
 pub struct Refinement<'a> {
     images: Vec<WeightedImage>,
     physics: &'a Physics,
@@ -103,8 +103,8 @@ pub struct Refinement<'a> {
     seed: u64,
     body: Body,
     displacements: Vec<f64>,
-    /// What is known of the slopes of all cells of the grid, row-major; of a cell that is no place
-    /// nothing is.
+    /// Evidence of the slopes of all cells of the grid, row-major; none for cells that are not
+    /// places.
     evidence: Evidence,
     ridge: f64,
     challenges: usize,
@@ -112,11 +112,11 @@ pub struct Refinement<'a> {
 }
 
 impl<'a> Refinement<'a> {
-    /// Shows a body all images: the first champion. `evidence` is of all cells of its grid,
+    /// Evaluates the first champion on all images. `evidence` covers all cells of its grid,
     /// row-major.
     ///
     /// # Errors
-    /// What the rollouts say.
+    /// Returns the error of the rollouts.
     pub fn new<R: Rollouts>(
         body: Body,
         images: Vec<WeightedImage>,
@@ -140,15 +140,15 @@ impl<'a> Refinement<'a> {
         })
     }
 
-    /// The champion.
+    /// Returns the champion.
     pub fn body(&self) -> &Body {
         &self.body
     }
 
-    /// Shows the champion other images: what challengers are compared on from now on.
+    /// Evaluates the champion on other images, on which challengers are compared from now on.
     ///
     /// # Errors
-    /// What the rollouts say.
+    /// Returns the error of the rollouts.
     pub fn show<R: Rollouts>(
         &mut self,
         images: Vec<WeightedImage>,
@@ -160,17 +160,17 @@ impl<'a> Refinement<'a> {
         Ok(())
     }
 
-    /// How far it walks under each image \[voxel lengths\].
+    /// Returns the champion's displacement under each image \[voxel lengths\].
     pub fn displacements(&self) -> &[f64] {
         &self.displacements
     }
 
-    /// Rollouts so far.
+    /// Returns the number of rollouts so far.
     pub fn rollouts(&self) -> usize {
         self.rollouts
     }
 
-    /// The champion's fitness: the weighted mean clipped margin of its answers.
+    /// Returns the champion's fitness: the weighted mean clipped margin of its answers.
     pub fn fitness(&self) -> f64 {
         let all: f64 = self.images.iter().map(|image| image.weight).sum();
         let scores = self.images.iter().zip(&self.displacements).map(|(image, d)| self.score(image, *d));
@@ -181,10 +181,10 @@ impl<'a> Refinement<'a> {
         image.weight * clipped_margin(image.right * displacement)
     }
 
-    /// Lets a body challenge the champion.
+    /// Compares a challenger with the champion, which it replaces if it wins.
     ///
     /// # Errors
-    /// What the rollouts say.
+    /// Returns the error of the rollouts.
     pub fn challenge<R: Rollouts>(
         &mut self,
         challenger: Body,
@@ -196,7 +196,7 @@ impl<'a> Refinement<'a> {
         let mut random = self.random(Use::Order);
         let order = self.order(&mut random);
         let mut found: Vec<f64> = Vec::new();
-        // As in an archive, what is unstable has no fitness.
+        // As in an archive, an unstable body has no fitness.
         let (mut look, mut shown, mut is_stable) = (FIRST_LOOK, 0, true);
         while found.len() < order.len() && !self.is_behind(&order, &found) {
             let next = &order[found.len()..order.len().min(found.len() + look)];
@@ -230,7 +230,7 @@ impl<'a> Refinement<'a> {
         Ok(Challenge { number: self.challenges, other_gait, shown, fitness: self.fitness(), won })
     }
 
-    /// A body to challenge the champion with.
+    /// Proposes a challenger.
     pub fn challenger(&self) -> Body {
         let mut random = self.random(Use::Challenger);
         if random.unit() < OTHER_GAITS {
@@ -242,7 +242,7 @@ impl<'a> Refinement<'a> {
         }
     }
 
-    /// The champion with some sensors chosen by the slopes, among a random half of its places.
+    /// Proposes sensors chosen by the slopes, at a random half of the champion's places.
     fn other_sensors(&self, gait: &Gait, random: &mut Stream) -> Body {
         let slopes = self.evidence.slopes_alone(self.ridge);
         let of_place = |place: &(usize, usize)| slopes[place.0 * self.body.width() + place.1];
@@ -264,7 +264,7 @@ impl<'a> Refinement<'a> {
         if solved != design {
             return gait.built(&solved);
         }
-        // The model knows nothing better: one place at random.
+        // The model finds no better design: change one place at random.
         let mut other: Design = design;
         let place = random.below(other.len());
         let others: Vec<Material> =
@@ -273,7 +273,7 @@ impl<'a> Refinement<'a> {
         gait.built(&other)
     }
 
-    /// The champion with one to three voxels of other materials.
+    /// Proposes the champion with one to three voxels of other materials.
     fn other_gait(&self, random: &mut Stream) -> Body {
         for _ in 0..DRAWS {
             let mut voxels = self.body.voxels().clone();
@@ -293,7 +293,7 @@ impl<'a> Refinement<'a> {
         stream(self.seed, Purpose::Training, what as u64, self.challenges as u64)
     }
 
-    /// All images: those first on which the champion can be beaten, each kind at random.
+    /// Orders the images at random, those first on which the champion can be beaten.
     fn order(&self, random: &mut Stream) -> Vec<usize> {
         let count = self.images.len();
         let mut order = random.sample(count, count);
@@ -311,8 +311,7 @@ impl<'a> Refinement<'a> {
         self.score(image, displacement) - self.score(image, self.displacements[number])
     }
 
-    /// Whether a challenger that goes on as it began, or somewhat better, will not beat the
-    /// champion.
+    /// Returns true if a challenger will not win, even if it does somewhat better than so far.
     fn is_behind(&self, order: &[usize], found: &[f64]) -> bool {
         let mean_weight =
             self.images.iter().map(|image| image.weight).sum::<f64>() / self.images.len() as f64;
@@ -337,7 +336,7 @@ impl<'a> Refinement<'a> {
             }
             bound += sum;
             if seen < FIRST_LOOK as f64 / 2.0 {
-                // Nothing can be gained where all is as good as can be.
+                // This bounds the gain by 0 where the champion's answers are perfect.
                 bound += most;
             } else if left > 0.0 {
                 let mean = sum / seen;
@@ -349,9 +348,9 @@ impl<'a> Refinement<'a> {
         bound <= 0.0
     }
 
-    /// What a challenger with the champion's gait tells of the slopes: on each image by how much it
-    /// is wider, and by how much farther it walks. A soft voxel counts as one rest width, which it
-    /// is only nearly: what is learnt here proposes challengers, and decides nothing.
+    /// Adds the evidence of a challenger with the champion's gait: the differences of width and
+    /// displacement on each image. A soft voxel counts as one rest width, which is only nearly
+    /// true. The evidence only proposes challengers; it decides nothing.
     fn learn(&mut self, challenger: &Body, order: &[usize], found: &[f64]) {
         let cells = self.body.height() * self.body.width();
         let mut set = Moments::new(cells);
@@ -372,7 +371,7 @@ impl<'a> Refinement<'a> {
     }
 }
 
-/// How far a body walks under images \[voxel lengths\]; nowhere where it is unstable.
+/// Returns the displacements of a body \[voxel lengths\]; 0 where it is unstable.
 fn shown<R: Rollouts>(body: &Body, images: &[WeightedImage], rollouts: &mut R) -> Result<Vec<f64>, R::Error> {
     let stimuli: Vec<Grid<f64>> = images.iter().map(|image| image.stimulus.clone()).collect();
     let conditions: Vec<usize> = images.iter().map(|image| image.condition).collect();
@@ -380,7 +379,6 @@ fn shown<R: Rollouts>(body: &Body, images: &[WeightedImage], rollouts: &mut R) -
     Ok(found.into_iter().map(|displacement| displacement.unwrap_or(0.0)).collect())
 }
 
-/// What random numbers are drawn for.
 #[derive(Clone, Copy)]
 enum Use {
     Challenger = 4,
@@ -392,8 +390,8 @@ mod tests {
     use super::*;
     use std::convert::Infallible;
 
-    /// Bodies of one row that walk by the widths of their soft voxels and sensors; the first of
-    /// them is worth most.
+    /// Bodies of one row that walk by the widths of their soft voxels and sensors; the first has
+    /// the largest slope.
     struct Planted {
         physics: Physics,
         simulated: usize,
@@ -423,8 +421,8 @@ mod tests {
 
     const PLACES: usize = 12;
 
-    /// Images whose bright pixels are those of even columns, mostly, if right is right; else those
-    /// of odd ones.
+    /// Makes images whose bright pixels are mostly in even columns if right is correct, else in odd
+    /// ones.
     fn images(count: usize) -> Vec<WeightedImage> {
         let mut random = stream(1, Purpose::RandomImages, 0, 0);
         let image = |number: usize| {
@@ -442,8 +440,8 @@ mod tests {
         Planted { physics: Physics::default(), simulated: 0 }
     }
 
-    /// A champion of soft voxels after a number of challengers of its own, with the fitness after
-    /// each.
+    /// Refines a body of soft voxels; returns the champion, the fitness after each challenge, and
+    /// the number of rollouts.
     fn refined(challengers: usize) -> (Body, Vec<f64>, usize) {
         let (mut rollouts, physics) = (planted(), Physics::default());
         let evidence = (Evidence::new(PLACES), 1.0);
@@ -459,7 +457,7 @@ mod tests {
             course.push(challenge.fitness);
         }
         assert_eq!(rollouts.simulated, refinement.rollouts());
-        // What it says of the champion is what it does.
+        // The reported displacements are the champion's own.
         let stimuli: Vec<Grid<f64>> = refinement.images.iter().map(|image| image.stimulus.clone()).collect();
         let Ok(walked) = rollouts.roll(refinement.body(), &stimuli, &[]);
         assert_eq!(walked.into_iter().flatten().collect::<Vec<_>>(), refinement.displacements());
@@ -471,10 +469,9 @@ mod tests {
         let (body, course, rollouts) = refined(60);
         assert!(course.windows(2).all(|two| two[1] >= two[0]), "{course:?}");
         assert!(course[0].abs() < 1e-9 && course[60] > 0.45, "{course:?}");
-        // Most challengers are dropped before they have seen all images.
+        // Most challengers are dropped before they are evaluated on all images.
         assert!(rollouts < 200 * 61 * 2 / 3, "{rollouts}");
-        // The place that moves it most is an expanding sensor, since its pixel is bright where
-        // right is right.
+        // The place with the largest slope expands: its pixel is bright where right is correct.
         assert_eq!(body.voxels()[(0, 0)], Material::SensorExpand);
         assert_eq!(refined(60), (body, course, rollouts), "the same seed refines the same");
     }
@@ -510,7 +507,7 @@ mod tests {
         let Ok(challenge) = refinement.challenge(good.clone(), &mut rollouts);
         assert_eq!((challenge.won, challenge.shown), (true, 200));
         assert_eq!(*refinement.body(), good);
-        // A body with a muscle is another gait.
+        // A body with a muscle has another gait.
         let Ok(challenge) = refinement.challenge("656565656563".parse().unwrap(), &mut rollouts);
         assert!(challenge.other_gait);
     }

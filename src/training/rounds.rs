@@ -1,10 +1,10 @@
-//! Teaching a gait: from its response to a design that tells images apart.
+//! Training a gait: from its response to a design that tells images apart.
 //!
-//! The response says which design is best under the linear model. Where many places change at once
-//! the body is a little off the model, so the response is measured again around the design, under
-//! training images: in half of the rollouts some places are changed at random, an intervention as
-//! in the first response. Then the lesson is solved again. After a few such rounds the last design
-//! is [refined](super::refine): the designs before it challenge it first.
+//! The response gives the best design under the linear model. If many places change at once, the
+//! body deviates from the model, so the response is measured again around the design, under
+//! training images. In half of these rollouts some places change at random, an intervention as in
+//! the first response. Then the design problem is solved again. After a few rounds the last design
+//! is [refined](super::race); the designs before it are its first challengers.
 
 use crate::base::Grid;
 use crate::base::random::{Purpose, Stream, stream};
@@ -17,100 +17,99 @@ use crate::task::fitness::clipped_margin;
 use crate::training::race::{Challenge, Refinement, WeightedImage};
 use std::collections::BTreeSet;
 
-/// What rollouts with random images count beside those around the latest design. They are farther
-/// from it, but more, and each tells more of the slopes.
+/// Weight of rollouts with random images, relative to those around the latest design. They are
+/// farther from it, but there are more, and each carries more information about the slopes.
 const RANDOM_WEIGHT: f64 = 0.3;
 
-/// What the rollouts of a round count in each round after it. With less, slopes are noise; with
-/// more, they are those of designs that were left.
+/// Factor on the weight of a round's rollouts in every later round. With less, slopes are noisy;
+/// with more, they describe abandoned designs.
 const FADE: f64 = 0.7;
 
 /// Probability that a place is drawn anew in a rollout around a design. Larger values leave the
-/// design's surroundings; smaller ones tell less of the slopes.
+/// design's neighbourhood; smaller ones carry less information about the slopes.
 const CHANGED: f64 = 0.15;
 
-/// Designs that are compared when refining begins: that of the last solution, and those of the
-/// rounds before.
+/// Most designs of earlier rounds that challenge the last one when refining begins.
 const FINALISTS: usize = 4;
 
-/// Challengers that are compared on the same images. With more, they win by chance on these; with
-/// fewer, showing the champion other images costs more.
+/// Challengers compared on the same images. With more, some win by chance on these; with fewer,
+/// evaluating the champion on other images costs more.
 const CHALLENGERS_OF_A_SET: usize = 30;
 
-/// How a gait is taught.
+/// The settings of a training.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
-    /// Seed of all chance.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// Rounds in which the response is measured around a design; 0: the robot keeps its own.
+    /// Rounds that measure the response around a design; 0: the robot keeps its own design.
     pub rounds: usize,
     /// Training images of a round.
     pub images: usize,
-    /// Training images under which the last designs are compared.
+    /// Training images on which the last designs are compared.
     pub final_images: usize,
     /// Bodies that challenge the best of those.
     pub challengers: usize,
-    /// Least number of muscles of such a body.
+    /// Least number of muscles in such a body.
     pub min_muscles: usize,
 }
 
 /// A training image as a gait sees it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
-    /// What the voxels see.
+    /// Pixels at the voxels.
     pub stimulus: Grid<f64>,
     /// Its class.
     pub class: u8,
     /// Its widths, its correct side and its weight.
     pub example: Example,
-    /// The condition under which it is shown: a number from 0.
+    /// Number of its condition, from 0.
     pub condition: usize,
 }
 
-/// What a round told.
+/// The results of a round.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Round {
     /// Its number, from 1.
     pub round: usize,
-    /// What the model said of the design: mean clipped margin of its answers to all training images.
+    /// Predicted mean clipped margin of the design's answers to all training images.
     pub predicted: f64,
     /// Mean clipped margin of its answers to the images of the round.
     pub measured: f64,
-    /// By how far displacements were to the right of what the model said, on average \[voxel
+    /// Mean difference of the displacements from the prediction; positive to the right \[voxel
     /// lengths\].
     pub off: f64,
-    /// Places that the next design has otherwise.
+    /// Number of places that change in the next design.
     pub changed: usize,
-    /// Rollouts so far, the first response left out.
+    /// Rollouts so far, without the first response.
     pub rollouts: usize,
 }
 
-/// A design that was taught.
+/// A trained design.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Taught {
     /// The body.
     pub body: Body,
-    /// Training images it was shown at the end, by their numbers.
+    /// Numbers of the training images on which it was evaluated at the end.
     pub shown: Vec<usize>,
     /// Its displacement under each of them \[voxel lengths\].
     pub displacements: Vec<f64>,
     /// Mean clipped margin of its answers.
     pub objective: f64,
-    /// Which way the first group walks: 1 right, −1 left.
+    /// Direction in which the first group walks: 1 right, −1 left.
     pub side: f64,
-    /// Rollouts, the first response left out.
+    /// Rollouts, without the first response.
     pub rollouts: usize,
 }
 
-/// What simulates designs.
+/// A simulator of designs.
 pub trait Rollouts {
-    /// Why there are none: stopped, or a file that cannot be written.
+    /// Error of a simulation: it was stopped, or a file could not be written.
     type Error;
-    /// The displacements of a body under stimuli and conditions \[voxel lengths\]; `None` where it
-    /// is unstable.
+    /// Returns the displacements of a body under stimuli and conditions \[voxel lengths\]; `None`
+    /// where it is unstable.
     ///
     /// # Errors
-    /// If it was stopped.
+    /// Returns an error if it was stopped, or if a file cannot be written.
     fn roll(
         &mut self,
         body: &Body,
@@ -119,7 +118,7 @@ pub trait Rollouts {
     ) -> Result<Vec<Option<f64>>, Self::Error>;
 }
 
-/// Teaches a gait, whose response is known, to tell images apart.
+/// Trains a gait with a known response to tell images apart.
 pub struct Teacher<'a> {
     gait: &'a Gait,
     physics: &'a Physics,
@@ -127,15 +126,15 @@ pub struct Teacher<'a> {
     plan: Plan,
     ridge: f64,
     conditions: usize,
-    /// What all rollouts so far tell of the slopes.
+    /// Evidence of the slopes from all rollouts so far.
     evidence: Evidence,
     slopes: Vec<f64>,
     /// By condition \[voxel lengths\].
     intercepts: Vec<f64>,
-    /// The latest design, and those before it.
+    /// The latest design; `earlier` has those before it.
     design: Design,
     earlier: Vec<Design>,
-    /// What the model says of the latest.
+    /// Prediction for the latest design.
     predicted: f64,
     side: f64,
     rounds: usize,
@@ -143,10 +142,10 @@ pub struct Teacher<'a> {
 }
 
 impl<'a> Teacher<'a> {
-    /// Solves the lesson with what the response says: the first design.
+    /// Solves the design problem for the first design, by the response alone.
     ///
     /// # Panics
-    /// Without an image.
+    /// Panics if there are no images.
     pub fn new(
         gait: &'a Gait,
         response: &Response,
@@ -186,15 +185,15 @@ impl<'a> Teacher<'a> {
         teacher
     }
 
-    /// What the model says of the latest design: mean clipped margin of its answers to all training images.
+    /// Returns the predicted mean clipped margin of the latest design over all training images.
     pub fn predicted(&self) -> f64 {
         self.predicted
     }
 
-    /// Measures the response around the design, and solves the lesson again.
+    /// Measures the response around the design, and solves the design problem again.
     ///
     /// # Errors
-    /// What the rollouts say.
+    /// Returns the error of the rollouts.
     pub fn round<R: Rollouts>(&mut self, rollouts: &mut R) -> Result<Round, R::Error> {
         self.rounds += 1;
         let mut random = self.random(Use::Round, self.rounds as u64);
@@ -214,11 +213,11 @@ impl<'a> Teacher<'a> {
         Ok(round)
     }
 
-    /// Takes the robot's own design, and the side that suits it, in place of a solution; measures the
-    /// response around it. Returns its mean clipped margin.
+    /// Takes the robot's own design and the side that suits it in place of a solution, and measures
+    /// the response around it. Returns its mean clipped margin.
     ///
     /// # Errors
-    /// What the rollouts say.
+    /// Returns the error of the rollouts.
     pub fn own<R: Rollouts>(&mut self, rollouts: &mut R) -> Result<f64, R::Error> {
         self.design = self.gait.design();
         let (measured, _) = self.measured(&mut self.random(Use::Round, 0), rollouts)?;
@@ -228,8 +227,8 @@ impl<'a> Teacher<'a> {
         Ok(measured.abs())
     }
 
-    /// Measures the response around the design, under training images: the mean clipped margin of its
-    /// answers, and by how far displacements were to the right of what the model said.
+    /// Measures the response around the design under training images. Returns the mean clipped
+    /// margin of its answers, and the mean difference of the displacements from the prediction.
     fn measured<R: Rollouts>(
         &mut self,
         random: &mut Stream,
@@ -238,8 +237,8 @@ impl<'a> Teacher<'a> {
         let numbers = self.drawn(self.plan.images, random);
         let draw = |(turn, number): (usize, &usize)| {
             let material = |material: &Material| {
-                // Half of the rollouts are of the design itself; the groups take turns, so as many
-                // of each. A soft voxel stays one: all rollouts are of one body.
+                // Half of the rollouts use the design itself; the groups alternate, so both have as
+                // many. Soft voxels stay soft: all rollouts are of one body.
                 if turn / 2 % 2 == 1 && *material != Material::Soft && random.unit() < CHANGED {
                     SENSORS[random.below(SENSORS.len())]
                 } else {
@@ -280,11 +279,11 @@ impl<'a> Teacher<'a> {
         Ok((measured, if stable > 0.0 { off / stable } else { 0.0 }))
     }
 
-    /// Shows the last designs the same training images, and refines the best of them by
-    /// challengers; `told` hears of each.
+    /// Compares the last designs on the same training images, and refines the best by challengers.
+    /// `told` is called after each challenge.
     ///
     /// # Errors
-    /// What the rollouts say.
+    /// Returns the error of the rollouts.
     pub fn finish<R: Rollouts>(
         self,
         rollouts: &mut R,
@@ -326,12 +325,12 @@ impl<'a> Teacher<'a> {
         })
     }
 
-    /// How many bodies will challenge the design: those before it, and the challengers of the plan.
+    /// Returns the number of challengers: the designs before the last one, and those of the plan.
     pub fn challengers(&self) -> usize {
         self.finalists().len() + self.plan.challengers
     }
 
-    /// The designs before the latest that challenge it first, the last of them first.
+    /// Returns the earlier designs that challenge first, the latest of them first.
     fn finalists(&self) -> Vec<Design> {
         let mut finalists: Vec<Design> = Vec::new();
         for design in self.earlier.iter().rev() {
@@ -342,8 +341,8 @@ impl<'a> Teacher<'a> {
         finalists
     }
 
-    /// Training images to compare bodies on, by their numbers, and as they are shown: of both
-    /// groups as many as far as they go, and of every class one or more, if there is room.
+    /// Draws training images for comparing bodies; returns their numbers and the images. Both
+    /// groups have as many if possible, and every class has at least one if there is room.
     fn compared_on(&self, draw: usize) -> (Vec<usize>, Vec<WeightedImage>) {
         let mut random = self.random(Use::Finish, draw as u64);
         let numbers = self.drawn(self.plan.final_images, &mut random);
@@ -357,7 +356,8 @@ impl<'a> Teacher<'a> {
         stream(self.plan.seed, Purpose::Training, what as u64, number)
     }
 
-    /// So many different training images, or all; both groups by turns as far as they go.
+    /// Draws `count` different training images, or all. The groups alternate while both have
+    /// images.
     fn drawn(&self, count: usize, random: &mut Stream) -> Vec<usize> {
         let of = |right: f64| -> Vec<usize> {
             (0..self.images.len()).filter(|number| self.images[*number].example.right == right).collect()
@@ -375,8 +375,8 @@ impl<'a> Teacher<'a> {
         drawn
     }
 
-    /// Images with every class among them: where one is missing, a random image of it replaces the
-    /// last of its group whose class has another.
+    /// Adds missing classes: a random image of each replaces the last image of its group whose
+    /// class has another.
     fn with_every_class(&self, mut numbers: Vec<usize>, random: &mut Stream) -> Vec<usize> {
         let classes: BTreeSet<u8> = self.images.iter().map(|image| image.class).collect();
         for class in classes {
@@ -402,8 +402,8 @@ impl<'a> Teacher<'a> {
         numbers.iter().map(|number| self.images[*number].condition).collect()
     }
 
-    /// Mean clipped margin of displacements under training images, by their numbers; both groups weigh the
-    /// same, however many images of each there are.
+    /// Returns the mean clipped margin of displacements, given by the numbers of their training
+    /// images. Both groups weigh the same, however many images each has.
     fn mean_score(&self, answers: impl Iterator<Item = (usize, f64)>) -> f64 {
         let (mut scores, mut counts) = ([0.0; 2], [0.0; 2]);
         for (number, displacement) in answers {
@@ -417,8 +417,8 @@ impl<'a> Teacher<'a> {
         means.iter().sum::<f64>() / means.len().max(1) as f64
     }
 
-    /// Solves the lesson under the model, from a design on: what the model says of the solution,
-    /// and the solution.
+    /// Solves the design problem from a design on; returns the predicted objective and the
+    /// solution.
     fn solved(&self, from: &[Material], side: f64, solve: impl FnOnce(&mut Lesson)) -> (f64, Design) {
         let examples = self.images.iter().map(|image| (&image.example, self.intercepts[image.condition]));
         let mut lesson = Lesson::predicted(examples, &self.slopes, from, side);
@@ -427,7 +427,6 @@ impl<'a> Teacher<'a> {
     }
 }
 
-/// What random numbers are drawn for.
 #[derive(Clone, Copy)]
 enum Use {
     First = 1,
@@ -435,7 +434,7 @@ enum Use {
     Finish = 3,
 }
 
-/// Where a design is unstable it gets nowhere.
+/// An unstable design counts as one that does not move.
 fn nowhere(displacement: Option<f64>) -> f64 {
     displacement.unwrap_or(0.0)
 }
@@ -448,8 +447,8 @@ mod tests {
     use crate::response::regression::Shown;
     use std::convert::Infallible;
 
-    /// A body that walks by the widths of its places, less and less far, and otherwise where they
-    /// are narrow.
+    /// A body that walks by the widths of its places with diminishing effect; its slopes depend a
+    /// little on the widths.
     struct Planted {
         gait: Gait,
         physics: Physics,
@@ -482,13 +481,13 @@ mod tests {
             let mut random = stream(7, Purpose::RandomImages, 1, 0);
             let mut image = |number: usize| {
                 let right = if number.is_multiple_of(2) { 1.0 } else { -1.0 };
-                // Every pixel says a little of the class.
+                // Every pixel carries a little information about the class.
                 let bright = |c: usize| 0.5 + if c.is_multiple_of(2) { 0.15 * right } else { -0.15 * right };
                 let stimulus = Grid::from_fn(1, self.slopes.len(), |_, column| {
                     f64::from(u8::from(random.unit() < bright(column)))
                 });
                 let example = Example { right, ..Example::new(&self.gait, &stimulus, &self.physics) };
-                // The second group has many classes, the last of them seldom.
+                // The second group has many classes; the last of them is rare.
                 let class = if right > 0.0 { 0 } else { 1 + (number / 2 % 49 / 8) as u8 };
                 Image { stimulus, class, example, condition: number / 2 % 2 }
             };
@@ -506,8 +505,8 @@ mod tests {
             Response::of(&(0..rollouts).map(&mut shown).collect::<Vec<_>>()).unwrap()
         }
 
-        /// What is taught, the rounds, and the share of images that the first and the last design
-        /// answer right.
+        /// Trains; returns the design, the rounds, and the accuracies of the first and the last
+        /// design.
         fn taught(&mut self, images: usize, response: usize) -> (Taught, Vec<Round>, [f64; 2]) {
             let (gait, physics) = (self.gait.clone(), self.physics.clone());
             let images = self.images(images);
@@ -542,7 +541,7 @@ mod tests {
             stimuli: &[Grid<f64>],
             conditions: &[usize],
         ) -> Result<Vec<Option<f64>>, Infallible> {
-            // What is neither soft nor a sensor does nothing.
+            // Other materials do not contribute.
             let design: Design = body.voxels().cells().to_vec();
             self.asked.push((design.clone(), stimuli.len()));
             let walk = |(stimulus, condition): (&Grid<f64>, &usize)| {
@@ -570,7 +569,7 @@ mod tests {
         assert!(taught.rollouts <= PLAN.rounds * PLAN.images + shown);
         assert_eq!(taught.rollouts, planted.asked.iter().map(|(_, images)| images).sum::<usize>());
         assert!(rounds.last().unwrap().off.abs() < 2.0, "{rounds:?}");
-        // What it says of the design is what was measured, under images of both groups.
+        // The reported displacements are those measured, under images of both groups.
         let images = planted.images(600);
         assert_eq!((taught.shown.len(), taught.displacements.len()), (100, 100));
         let right = taught.shown.iter().filter(|number| images[**number].example.right == 1.0).count();

@@ -1,4 +1,4 @@
-//! A training's course: every gait is taught in one round, the best goes on.
+//! The course of a training: every gait is trained for one round; the best continues.
 
 use crate::base::error::Error;
 use crate::base::number;
@@ -27,13 +27,12 @@ use crate::training::window::{Found, Windows};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-/// What all gaits are trained with.
 pub(super) struct Trainer<'a> {
     pub(super) config: &'a Config,
     pub(super) dataset: &'a Dataset,
     pub(super) training: &'a Training,
     pub(super) probing: Probing,
-    /// Displacements of each gait with random images that are known before.
+    /// Displacements of each gait with random images that were known beforehand.
     pub(super) measured: Vec<Batch>,
 }
 
@@ -53,7 +52,7 @@ impl Trainer<'_> {
         Ok(response(&shown, count))
     }
 
-    /// The config with the window under which a gait could be taught most.
+    /// Returns the config with the window that has the best prediction for a gait.
     fn with_window(
         &self,
         walker: &Walker,
@@ -81,7 +80,7 @@ impl Trainer<'_> {
         self.config.task.groups.as_ref().expect("a training has two groups")
     }
 
-    /// The training images as a gait sees them by a config; both groups weigh the same.
+    /// Returns the training images as a gait sees them; both groups weigh the same.
     fn images(&self, gait: &Gait, config: &Config) -> Result<Vec<Image>, Error> {
         let Trainer { training, probing, .. } = self;
         let all = probing.conditions();
@@ -108,7 +107,7 @@ impl Trainer<'_> {
         }
     }
 
-    /// Teaches all gaits in one round, and goes on with the one that could be taught most.
+    /// Trains all gaits for one round, then continues with the one that has the best prediction.
     pub(super) fn train<'w>(
         &self,
         walkers: &'w [Walker<'w>],
@@ -124,7 +123,7 @@ impl Trainer<'_> {
             let Some(response) = self.response(gait, measured, log)? else { continue };
             report_response(session, &walker.robot.id, gait, &response);
             let seeing = match plan.rounds {
-                // It keeps its own sensors, which are for the images as it sees them.
+                // It keeps its own sensors, which suit the images in its own window.
                 0 => Config { train: TrainConfig { windows: 0, ..config.train }, ..(*config).clone() },
                 _ => self.with_window(walker, &response, log, session)?,
             };
@@ -159,7 +158,7 @@ impl Trainer<'_> {
         let has_simulated = Arc::clone(&rollouts.log.has_simulated);
         has_simulated.store(false, Ordering::Relaxed);
         let told = |challenge: &Challenge| {
-            // One that was kept by an earlier session took no time.
+            // A challenge recorded by an earlier session took no time.
             if !has_simulated.swap(false, Ordering::Relaxed) {
                 session.observer.skips(1);
             }

@@ -1,8 +1,8 @@
-//! [`Windows`]: which part of the images a gait is taught to look at.
+//! [`Windows`]: the part of the images that a gait is trained to look at.
 //!
-//! Some places of a gait move it far, others do not, and some pixels tell two groups of images
-//! apart, others do not. A window of the images, stretched over the body, brings them together. What
-//! a gait could be taught under a window is predicted from its response alone, so many can be tried.
+//! Some places of a gait move it far, others do not; some pixels distinguish two groups of images,
+//! others do not. A window of the images, stretched over the body, brings them together. The
+//! response alone predicts the result under a window, so many windows can be tried.
 
 use crate::base::Grid;
 use crate::base::error::Error;
@@ -21,44 +21,43 @@ use crate::task::margins::Margins;
 use crate::task::stimulus::{StimulusParams, stimulus};
 use rayon::prelude::*;
 
-/// Windows that are tried side by side before the next are drawn. With more, those near the best
-/// are drawn when it is known less well; with fewer, cores are idle.
+/// Windows evaluated in parallel before the next are drawn. With more, windows near the best are
+/// drawn when it is known less well; with fewer, cores are idle.
 const BATCH: usize = 20;
 
-/// Most images by which windows are compared. More cost time, and the best is hardly another.
+/// Most images by which windows are compared. More cost time and hardly change the best window.
 const IMAGES: usize = 1000;
 
-/// Least side of a window, as a share of the image's: one over this. Smaller ones show every voxel
-/// the same.
+/// Image side divided by the least side of a window. With more, small windows show every voxel
+/// almost the same.
 const LEAST_SHARE: usize = 4;
 
-/// By how many pixels an edge of a window is moved at most, when the best is bettered.
+/// Most pixels by which an edge moves when the best window is improved.
 const NEAR: usize = 2;
 
-/// Windows of the training images of a task, and how they are seen.
+/// Windows of the training images of a task.
 pub(crate) struct Windows<'a> {
-    /// Which way is right, the weight, and the image.
+    /// Correct side, weight, and pixels.
     images: Vec<(f64, f64, Grid<u8>)>,
     config: &'a Config,
 }
 
-/// The best window that was found.
+/// The best window found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Found {
-    /// What lies outside.
+    /// Margins outside the window.
     pub(crate) margins: Margins,
-    /// What the model says could be taught under it: mean clipped margin of the answers.
+    /// Predicted mean clipped margin of the answers under it.
     pub(crate) predicted: f64,
-    /// The same for the window that the config names.
+    /// Predicted mean clipped margin under the window of the config.
     pub(crate) predicted_before: f64,
 }
 
 impl<'a> Windows<'a> {
-    /// Windows of some of these training images, which are given class by class; as many as
-    /// `train.windows` says.
+    /// Takes at most 1000 of these training images, which are in the order of their classes.
     ///
     /// # Errors
-    /// If an image is not there.
+    /// Returns an error if an image is missing.
     pub(crate) fn of(
         config: &'a Config,
         dataset: &Dataset,
@@ -75,11 +74,12 @@ impl<'a> Windows<'a> {
         Ok(Windows { images: images.collect::<Result<_, Error>>()?, config })
     }
 
-    /// The window under which a gait could be taught most, of that of the config, windows anywhere,
-    /// and windows near the best. `told` hears how many were tried.
+    /// Returns the window with the best prediction among the config's own, windows anywhere, and
+    /// windows near the best. `train.windows` is their number. `told` is called with the number
+    /// tried so far.
     ///
     /// # Errors
-    /// [`Stopped`] if `stop` was set meanwhile.
+    /// Returns [`Stopped`] if `stop` was set in the meantime.
     pub(crate) fn best(
         &self,
         gait: &Gait,
@@ -114,7 +114,7 @@ impl<'a> Windows<'a> {
         Ok(best)
     }
 
-    /// What could be taught under a window.
+    /// Returns the predicted mean clipped margin under a window.
     fn predicted(&self, gait: &Gait, response: &Response, margin: Margins) -> f64 {
         let seen_as = StimulusParams { margin, ..self.config.stimulus };
         let (height, width) = (self.config.body.height, self.config.body.width);
@@ -134,13 +134,12 @@ impl<'a> Windows<'a> {
         [(0, 1.0), (1, -1.0)].into_iter().map(solved).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Height and width of the images.
     fn sides(&self) -> [usize; 2] {
         let (_, _, first) = self.images.first().expect("a task has training images");
         [first.height(), first.width()]
     }
 
-    /// A window of any size, anywhere.
+    /// Draws a window of any size, anywhere.
     fn anywhere(&self, random: &mut Stream) -> Margins {
         let [rows, columns] = self.sides().map(|side| {
             let shown = least(side) + random.below(side - least(side) + 1);
@@ -150,7 +149,7 @@ impl<'a> Windows<'a> {
         Margins { top: rows.0, bottom: rows.1, left: columns.0, right: columns.1 }
     }
 
-    /// A window near another.
+    /// Draws a window near another.
     fn near(&self, margins: Margins, random: &mut Stream) -> Margins {
         let [height, width] = self.sides();
         let mut moved = |side: usize, before: usize, after: usize| {
@@ -163,7 +162,7 @@ impl<'a> Windows<'a> {
     }
 }
 
-/// The least side of a window of images with this side.
+/// Returns the least side of a window of images with this side.
 fn least(side: usize) -> usize {
     side.div_ceil(LEAST_SHARE)
 }
@@ -176,7 +175,7 @@ mod tests {
     use crate::task::stimulus::Reduction;
 
     /// A body of 4 × 4 voxels that only its lower right quarter moves, and images of 12 × 12 pixels
-    /// whose classes differ in the upper left quarter alone.
+    /// whose classes differ only in the upper left quarter.
     struct Planted {
         config: Config,
         gait: Gait,

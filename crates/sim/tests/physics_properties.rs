@@ -1,4 +1,4 @@
-//! What must hold for any body and any stimulus.
+//! Properties that hold for any body and any stimulus.
 #![allow(clippy::disallowed_methods)]
 
 use morphcog_sim::{Body, Grid, Material, Physics, Start, System, Unstable, World};

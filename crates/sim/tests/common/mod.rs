@@ -23,7 +23,7 @@ pub struct Reference {
     pub unstable_at: i64,
     pub com: Vec<[f64; 2]>,
     pub points: BTreeMap<u64, Vec<[f64; 2]>>,
-    /// The same simulation in EvoGym itself at other columns; of sensitive ones only.
+    /// Runs of the simulation in EvoGym itself at other columns; only for sensitive ones.
     #[serde(default)]
     evogym_elsewhere: Vec<Elsewhere>,
 }
