@@ -232,7 +232,7 @@ impl World {
             dpi: Some(36),
             background: Background::Paper,
         };
-        case.check(figures::make(&console, &wanted), name);
+        case.check(plot::plot(&wanted, &Session::default()), name);
         for page in [out, err] {
             let text = String::from_utf8(page.0.lock().unwrap().clone()).unwrap();
             assert!(text.chars().all(|c| c == '\n' || !is_unseen(c)), "not harmless: {text:?}");
