@@ -1,4 +1,4 @@
-//! What the tasks of a sweep found, in one table.
+//! Collects the results of a sweep's tasks in one table.
 
 use crate::base::error::Error;
 use crate::base::table;
@@ -19,75 +19,75 @@ use crate::store::validation::ranking;
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// What a task found on one of the tasks that its robots do, as 0|1.
+/// Result of a task of the sweep for one task of its robots, as 0|1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// The task's number in the sweep, from 1.
+    /// Number of the task in the sweep, from 1.
     pub number: usize,
     /// Its name.
     pub name: String,
-    /// How far it is.
+    /// Its state.
     pub state: State,
-    /// Varied keys with its values.
+    /// Varied keys with their values.
     pub varied: Vec<(String, String)>,
-    /// Its run, as far as there is one.
+    /// Results of its run, if there is one.
     pub run: Option<RunRow>,
 }
 
-/// What a run found on one task.
+/// Results of a run for one task of its robots.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunRow {
-    /// What is told apart, as "0|1".
+    /// The two groups of classes, as "0|1".
     pub recognises: String,
     /// Generations done.
     pub generations: u64,
     /// Wall-clock time of the run \[s\].
     pub seconds: f64,
-    /// Elites of this task.
+    /// Number of elites of this task.
     pub num_elites: usize,
-    /// Largest objective of them.
+    /// Largest objective among them.
     pub obj_max: Option<f64>,
-    /// Balanced accuracy of the first robot on validation images, from 0 to 1.
+    /// Best balanced accuracy of its robots on validation images, from 0 to 1.
     pub validation: Option<f64>,
-    /// Robots audited, and how many of them are physical.
+    /// Numbers of audited robots, and of physical ones among them.
     pub audited: Option<[usize; 2]>,
-    /// How robots did on held-out images.
+    /// Results on held-out images.
     pub tested: Option<Tested>,
 }
 
-/// A test.
+/// Results of a test.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tested {
-    /// Which images.
+    /// Split of the images.
     pub split: HeldOut,
-    /// How many.
+    /// Number of images.
     pub images: usize,
-    /// Robots.
+    /// Number of robots.
     pub robots: usize,
     /// Their mean accuracy, from 0 to 1.
     pub accuracy: f64,
-    /// Its 95 % interval: of one robot over images, of several over robots.
+    /// Its 95 % interval: over images for one robot, over robots for several.
     pub interval: Option<[f64; 2]>,
     /// Their mean balanced accuracy.
     pub balanced: f64,
 }
 
-/// Everything that is collected.
+/// All collected results.
 #[derive(Clone, Debug)]
 pub struct Collected {
-    /// A row per task and what its robots tell apart.
+    /// One row per task and pair of groups that its robots tell apart.
     pub rows: Vec<Row>,
-    /// How the runs that evolved came along.
+    /// Progress of the runs that evolved.
     pub progress: Vec<Progress>,
     /// The run.json files, for commands that take several.
     pub archives: Vec<PathBuf>,
 }
 
-/// Collects what the tasks found so far; `status` is of the same tasks. `warn` is told of audits and
-/// tests that cannot be read, or are of another state of their run: these are left out.
+/// Collects the results of tasks so far; `status` belongs to the same tasks. Leaves out audits and
+/// tests that cannot be read or are of another state of their run, and reports them to `warn`.
 ///
 /// # Errors
-/// If a run is broken.
+/// Returns an error if a run is broken.
 pub fn collect(
     tasks: &[Task],
     status: &[Status],
@@ -95,7 +95,7 @@ pub fn collect(
     warn: &dyn Fn(&str),
 ) -> Result<Collected, Error> {
     let mut all = Collected { rows: Vec::new(), progress: Vec::new(), archives: Vec::new() };
-    // The first of those tests that were made without the plan.
+    // Settings of the first test that no plan requested.
     let mut without_plan = None;
     for (task, status) in tasks.iter().zip(status) {
         let folder = place.out.join(&task.name);
@@ -128,7 +128,7 @@ pub fn collect(
                 warn(&format!("{}: another test than of {first}: {key} = {there}, not {other}", task.name));
             }
         }
-        // As the run's own files call them.
+        // Named as in the run's own files.
         let grouping = run.config.grouping()?;
         let tasks = grouping.tasks().iter().zip(&run.dimensions.tasks);
         for (_, recognises) in tasks.filter(|(split, _)| !split.is_same_way()) {
@@ -142,7 +142,6 @@ pub fn collect(
     Ok(all)
 }
 
-/// What lies beside a run.
 struct Found {
     validated: Vec<crate::store::validation::Validated>,
     audit: Option<AuditFile>,
@@ -150,7 +149,7 @@ struct Found {
 }
 
 impl Found {
-    /// What the plan asks for, or what was found without it; nothing by other settings than the plan's.
+    /// Reads the results that match the plan; without a plan for tests, any test.
     fn of(task: &Task, source: &StoredRun, place: &Place, warn: &dyn Fn(&str)) -> Result<Self, Error> {
         let run = &source.run;
         let left_out = |text: &str| warn(&format!("{text}; left out"));
@@ -174,7 +173,7 @@ impl Found {
                 }
             },
             Some(_) => None,
-            // Tests may have been made without the plan.
+            // Tests may exist that the plan does not request.
             None => {
                 let splits = [HeldOut::Test, HeldOut::Validation];
                 let tests = splits.map(|split| source.path.with_file_name(own_name(split)));
@@ -219,7 +218,7 @@ impl Found {
     }
 }
 
-/// Whether a test is the plan's; `left_out` is told in what it is another.
+/// Returns true if the plan requests this test; if not, `left_out` gets the reason.
 fn is_planned_test(
     found: &EvalFile,
     source: &StoredRun,
@@ -247,7 +246,7 @@ fn is_planned_test(
     }
 }
 
-/// What a row says of its run, as the columns of `sweep.csv`; nothing where there is none.
+/// The run of a row as columns of `sweep.csv`, empty where there is no value.
 #[derive(Debug, Default, Serialize)]
 pub struct Columns<'a> {
     recognises: Option<&'a str>,
@@ -287,7 +286,7 @@ impl<'a> Columns<'a> {
         "balanced_accuracy",
     ];
 
-    /// Of a row.
+    /// Returns the columns of a row.
     pub fn of(row: &'a Row) -> Self {
         let Some(run) = &row.run else { return Columns::default() };
         let tested = run.tested.as_ref();
@@ -312,7 +311,7 @@ impl<'a> Columns<'a> {
     }
 }
 
-/// The table as CSV: a row per task and what its robots tell apart; a column per varied key.
+/// Returns the table as CSV: one row per task and pair of groups, one column per varied key.
 pub fn csv(rows: &[Row]) -> Vec<u8> {
     let mut keys: Vec<&String> = rows.iter().flat_map(|row| row.varied.iter().map(|(key, _)| key)).collect();
     keys.sort_unstable();

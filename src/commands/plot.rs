@@ -1,4 +1,4 @@
-//! `morphcog plot`: reads what figures are made of.
+//! `morphcog plot`: reads the data of figures.
 
 use crate::base::error::Error;
 use crate::config::{Settings, differing};
@@ -8,33 +8,33 @@ use crate::task::grouping::groups_text;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// How a run came along.
+/// Progress of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Progress {
     /// Name of the run.
     pub run: String,
     /// Its seed.
     pub seed: u64,
-    /// What its fitness is measured in.
+    /// Unit of its fitness.
     pub unit: Option<&'static str>,
-    /// A moment per generation, at least one.
+    /// One moment per generation, at least one.
     pub moments: Vec<Moment>,
-    /// All that its results depend on but the seed.
+    /// All settings that its results depend on, except the seed.
     pub settings: Settings,
 }
 
-/// Runs that differ in nothing but the seed, and so belong together.
+/// Runs that differ in their seed only.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Group<'a> {
-    /// What tells it from the others, as "parents=10, 0|1".
+    /// Label that tells it from other groups, as "parents=10, 0|1".
     pub label: String,
-    /// Its value of each key in which groups differ; none where it has no such key.
+    /// Its value for each key in which groups differ; `None` if it lacks the key.
     pub values: Vec<Option<String>>,
     /// Its runs.
     pub runs: Vec<&'a Progress>,
 }
 
-/// Runs in groups, in the order of their first ones, and the keys in which these differ.
+/// Groups runs, in the order of their first ones. Returns the keys in which groups differ, too.
 pub fn alike(runs: &[Progress]) -> (Vec<String>, Vec<Group<'_>>) {
     let mut groups: Vec<Vec<&Progress>> = Vec::new();
     for run in runs {
@@ -54,7 +54,7 @@ pub fn alike(runs: &[Progress]) -> (Vec<String>, Vec<Group<'_>>) {
             (key, Some(value)) => Some(format!("{}={value}", key.rsplit('.').next().unwrap_or(key))),
         };
         let words: Vec<String> = keys.iter().zip(&values).filter_map(word).collect();
-        // Two configs with the same settings may have two names, and are one group all the same.
+        // Configs with equal settings may have two names, and still form one group.
         (if words.is_empty() { runs[0].run.clone() } else { words.join(", ") }, values)
     };
     let described: Vec<(String, Vec<Option<String>>)> = groups.iter().map(group).collect();
@@ -63,7 +63,7 @@ pub fn alike(runs: &[Progress]) -> (Vec<String>, Vec<Group<'_>>) {
     (keys, described.into_iter().zip(groups).map(group).collect())
 }
 
-/// A value of a config for people: groups of classes as 0|1.
+/// Formats a value of a config for people: groups of classes as 0|1.
 fn spoken(value: &toml::Value) -> String {
     let classes = |list: &toml::Value| -> Option<Vec<u8>> {
         list.as_array()?.iter().map(|class| class.as_integer().and_then(|c| u8::try_from(c).ok())).collect()
@@ -79,7 +79,7 @@ impl Progress {
     /// Reads the metrics.csv beside a run.json.
     ///
     /// # Errors
-    /// What is missing or wrong, with its line.
+    /// Returns an error with the line if anything is missing or wrong.
     pub fn of(run: &RunFile, archive: &Path) -> Result<Self, Error> {
         let moments = moments_of(run, archive)?;
         let unit = run.fitness().unit();
