@@ -1,4 +1,4 @@
-//! `morphcog plot`: its words, and what it calls.
+//! `morphcog plot`: parses its arguments and runs it.
 
 use crate::base::error::Error;
 use crate::cli::choice;
@@ -42,7 +42,7 @@ Examples:
 
 #[derive(Debug, Args)]
 pub(super) struct PlotArgs {
-    /// What to show.
+    /// Kind of figure.
     #[arg(value_parser = offering(Kind::ALL.map(|(_, name)| name), str::parse::<Kind>))]
     kind: Kind,
     #[command(flatten)]
@@ -64,14 +64,14 @@ pub(super) struct PlotArgs {
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Control steps between the poses of snapshots (default: as suits the walk).
+    /// Control steps between the poses of snapshots (default: fits the walk).
     #[arg(long, value_parser = whole::<u32>(1..=MOST))]
     every: Option<u32>,
-    /// File; its ending (.svg, .png) says the format (default: both, plot-<kind>[-<robot>] beside
+    /// File; its ending (.svg, .png) sets the format (default: both, plot-<kind>[-<robot>] beside
     /// run.json).
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Resolution of the PNG, pixels per inch (default: 300, or less if a side had over 16000 pixels).
+    /// PNG resolution in pixels per inch (default: 300, or less for a side over 16000 pixels).
     #[arg(long, value_parser = whole::<u32>(36..=2400))]
     dpi: Option<u32>,
     /// Transparent background.
@@ -82,7 +82,7 @@ pub(super) struct PlotArgs {
 pub(super) fn run(args: PlotArgs, console: &Console) -> Result<(), Error> {
     let PlotArgs { kind, physical_only, images, data, dataset, .. } = args;
     let archives = args.archives.paths();
-    // What is wrong with the file is to be known before robots are searched for.
+    // A wrong file name must be reported before the search for robots.
     figures::endings(args.out.as_deref())?;
     let robots: Vec<Named> = match selected(args.robot)? {
         Some(_) if !kind.is_of_robot() => return Err(figures::no_robot(kind)),
