@@ -1,5 +1,4 @@
-//! Cost of what is larger than a substep: a rollout, a generation's rollouts, an evaluation, and a
-//! run's bookkeeping.
+//! Cost of a rollout, a generation's rollouts, an evaluation, and a run's bookkeeping.
 
 mod processor;
 
@@ -54,7 +53,7 @@ fn rollouts(criterion: &mut Criterion<Processor>) {
     }
 }
 
-/// Eight simulations of one body, whether or not this is what the program would do with it.
+/// Simulates one body eight times, one by one and side by side, as the program may or may not do.
 fn side_by_side(criterion: &mut Criterion<Processor>) {
     let config = config(&OVERRIDES);
     let stimuli: Vec<Grid<f64>> = (0..Worlds::MOST).map(stimulus).collect();
@@ -153,6 +152,6 @@ criterion_group! {
     config = Criterion::default().with_measurement(Processor);
     targets = rollouts, side_by_side
 }
-// Threads that wait for each other, and files: what they take is the clock's time.
+// Threads that wait for each other, and files, take wall-clock time.
 criterion_group!(by_the_clock, evaluations, bookkeeping);
 criterion_main!(one_thread, by_the_clock);

@@ -1,8 +1,8 @@
-//! How one run scales over many processes (`mpirun morphcog evolve`), by replaying what was measured.
+//! Estimates the scaling of one run over many processes (`mpirun morphcog evolve`).
 //!
-//! Evolves for a while, measures how long each robot of further generations takes, one thread each,
-//! and then divides these over 1 to 256 ranks as the program does. The exchange at the end of a
-//! generation is measured when this is started by mpirun with feature `mpi`.
+//! Evolves for a while, measures each robot's time in further generations on one thread, and then
+//! divides these among 1 to 256 ranks as the program does. Started by mpirun with feature `mpi`, it
+//! measures the exchange at the end of a generation instead.
 
 use morphcog::base::clock::thread_time;
 use morphcog::base::random::{Purpose, stream};
@@ -21,12 +21,11 @@ use std::time::Instant;
 
 /// Numbers of ranks.
 const RANKS: [usize; 9] = [1, 2, 4, 8, 16, 32, 64, 128, 256];
-/// Time of one exchange between two nodes of a cluster, assumed where none is measured \[s\]: an
-/// all-gather needs as many as the ranks have binary digits.
+/// Assumed time of one exchange between nodes \[s\]; an all-gather needs log2(ranks), rounded up.
 const HOP: f64 = 50e-6;
 
-/// What is run: a name, changes of `zero_one_published.toml`, generations before measuring, generations
-/// that are measured, and how many of these make one generation: as with so many times the parents.
+/// A case: name, changes of `zero_one_published.toml`, generations before measuring, measured
+/// generations, and how many of these form one, as if with so many times the parents.
 type Case = (&'static str, &'static [&'static str], u64, u64, usize);
 
 const CASES: [Case; 3] = [
@@ -35,7 +34,7 @@ const CASES: [Case; 3] = [
     ("100 images, 20 parents", &MANY_IMAGES, 2, 2, 1),
 ];
 
-/// Changes of the last one.
+/// Changes of the last case.
 const MANY_IMAGES: [&str; 3] =
     ["data.train_images=", "data.images_per_class=50", "evaluation.fitness=mean_clipped"];
 
@@ -45,13 +44,13 @@ struct Piece {
     voxels: u64,
     /// Processor time \[s\].
     seconds: f64,
-    /// Rollouts that were simulated.
+    /// Number of simulated rollouts.
     rollouts: u64,
 }
 
 fn main() {
     let (ranks, _guard) = Ranks::join().expect("MPI is there, or there is one process");
-    // Called by `cargo test`, which has nothing to measure.
+    // `cargo test` calls it, too, but has nothing to measure.
     if !std::env::args().any(|argument| argument == "--bench") {
         return;
     }
@@ -86,7 +85,7 @@ fn main() {
     }
 }
 
-/// The robots of some generations, and what each takes.
+/// Measures each robot of some generations.
 fn measure(overrides: &[&str], before: u64, measured: u64) -> Vec<Vec<Piece>> {
     let own = ["data.dataset=builtin", "data.train_images=[0, 1]", "protocol.rollout=fresh"];
     let all: Vec<String> = own.iter().chain(overrides).map(ToString::to_string).collect();
@@ -137,13 +136,13 @@ fn measure(overrides: &[&str], before: u64, measured: u64) -> Vec<Vec<Piece>> {
         .collect()
 }
 
-/// Time of a generation whose robots are divided, as the program does it \[s\].
+/// Returns the time of a generation if robots are divided, as in the program \[s\].
 fn by_robot(pieces: &[Piece], ranks: usize) -> f64 {
     let sizes: Vec<u64> = pieces.iter().map(|piece| piece.voxels).collect();
     longest(pieces.iter().map(|piece| piece.seconds), &owners(&sizes, ranks), ranks)
 }
 
-/// The same if single rollouts were divided \[s\].
+/// Returns the time of a generation if single rollouts were divided \[s\].
 fn by_rollout(pieces: &[Piece], ranks: usize) -> f64 {
     let single = |piece: &Piece| {
         let count = piece.rollouts.max(1);

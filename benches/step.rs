@@ -19,7 +19,7 @@ fn steps(criterion: &mut Criterion<Processor>) {
     for specimen in specimens() {
         let system = Arc::new(System::new(&specimen.body, physics.clone()));
         let mut group = criterion.benchmark_group(specimen.name);
-        // So that times are read per substep.
+        // Criterion then reports times per substep.
         group.throughput(Throughput::Elements(u64::from(physics.substeps)));
         for set in InstructionSet::ALL.into_iter().filter(|set| set.is_available()) {
             let start = Start { column: 493, row: physics.ground_row };

@@ -62,13 +62,13 @@ use std::path::{Path, PathBuf};
 /// Runs a command.
 ///
 /// # Errors
-/// What went wrong; its kind has the exit code.
+/// Returns an error whose kind sets the exit code.
 pub fn run(cli: Cli, console: &Console, ranks: Ranks) -> Result<(), Error> {
     let _environment = FloatEnvironment::standard();
     InstructionSet::asked().map_err(|text| Error::usage(text).advice("or leave it unset"))?;
     threads::check_environment()?;
     if cli.quiet && cli.json {
-        // clap sees it only where both are on the same side of the command's name.
+        // clap finds the conflict only if both are on the same side of the command's name.
         return Err(Error::usage("--quiet: expected without --json".to_string()));
     }
     let is_shared = matches!(cli.command, Command::Evolve(_) | Command::Eval(_) | Command::Audit(_));
@@ -152,13 +152,13 @@ struct Resources {
 }
 
 impl Resources {
-    /// Returns those of one process.
+    /// Returns the resources of one process.
     fn of(threads: Option<u16>, data: Option<PathBuf>) -> Self {
         Resources { threads, data, ranks: Ranks::ALONE }
     }
 }
 
-/// Runs a command in a session that signals stop and that reports to the terminal.
+/// Runs a command in a session that signals can stop and that reports to the terminal.
 fn in_session<T>(
     console: &Console,
     Resources { threads, data, ranks }: Resources,
@@ -217,7 +217,7 @@ fn run_evolve(args: EvolveArgs, console: &Console, ranks: Ranks) -> Result<(), E
     Ok(())
 }
 
-/// Replays the best robot of a run folder into it.
+/// Replays the best robot of a run into its folder.
 fn replay_best(folder: &Path, shown: replay::Options, console: &Console) -> Result<(), Error> {
     let (robot, archive) = (BEST.to_string(), Some(folder.join(RUN_JSON)));
     let replay = replay::replay(&replay::Options { robot, archive, ..shown })?;
@@ -246,7 +246,7 @@ fn run_eval(args: EvalArgs, console: &Console, ranks: Ranks) -> Result<(), Error
     test(&options, Resources { ranks, ..Resources::of(args.threads, args.data) }, console)
 }
 
-/// Tests robots, and says how they did.
+/// Tests robots, and prints the results.
 fn test(options: &eval::Options, with: Resources, console: &Console) -> Result<(), Error> {
     let eval::Finished { file: report, unwritten } =
         in_session(console, with, |session| eval::eval(options, session))?;
@@ -271,9 +271,9 @@ fn test(options: &eval::Options, with: Resources, console: &Console) -> Result<(
 fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
     let ReplayArgs { physical_only, images, dataset, data, format, out, open, .. } = args;
     let (width, every, fps, look) = (args.width, usize::from(args.every), args.fps, args.look);
-    // What is wrong with the file is to be known before the simulation starts.
+    // A wrong file name must be reported before the simulation starts.
     let named = out.as_deref().map(|path| pictures::Wanted::named(path, &format)).transpose()?;
-    // Without a run, the best body that ships with the program.
+    // Without a run, it shows the best body that ships with the program.
     let is_bare = args.archive.is_none() && args.robot == Selection::Ids(vec![BEST.to_string()]);
     let is_first_look = is_bare && folder::newest_run().is_err();
     let archives = match is_first_look {
@@ -303,18 +303,17 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
     }
 }
 
-/// Opens a file with the program that the system has for it.
 fn show(path: &Path) -> Result<(), Error> {
-    // Why not is the business of programs that nobody here has asked for.
+    // The reason would name programs that the user never chose.
     open::that(path).map_err(|_| {
         let text = format!("{}: no program could be started to show it", path.display());
         Error::other(text).advice("the file is written: open it yourself")
     })
 }
 
-/// The robot that is to be watched.
+/// Returns the robot to watch.
 fn the_one(search: &one_by_one::Options, data: Option<PathBuf>, console: &Console) -> Result<Named, Error> {
-    // What is more than one for certain needs no search.
+    // If it is certain that there are several, no search is needed.
     let many = |these: String, first: &str| {
         let text = format!("--robot: expected one robot to watch, these are {these}");
         let error = Error::usage(text).advice(format!("name one, as in --robot {first}"));
@@ -344,14 +343,14 @@ fn run_simulate(args: &SimulateArgs, console: &Console) -> Result<(), Error> {
             let scenario = simulate::Scenario::read(&args.scenario)?;
             let written = |row: String| {
                 console.text(&row);
-                // Nobody waits for the rest.
+                // Nobody reads the rest.
                 if console.is_closed() {
                     Err(Error::other("the standard output is closed".to_string()))
                 } else {
                     Ok(())
                 }
             };
-            // Why it was closed is known to the console, and to `main` if results were lost.
+            // The console knows why it was closed, as does `main` if results were lost.
             simulate::simulate(&scenario, args.points, written)
                 .or_else(|error| if console.is_closed() { Ok(()) } else { Err(error) })
         }
@@ -376,7 +375,7 @@ fn run_data(command: DataCommand, console: &Console) -> Result<(), Error> {
         DataCommand::Info(DatasetArgs { dataset, data, transpose }) => {
             let found = data::info(&dataset, &given(data.as_deref()), transpose);
             let mut found = found?;
-            // A split that is not there is said; one that cannot be used is an error.
+            // A missing split is reported; an unusable one is an error.
             let is_there = |(_, problem): &(Split, DatasetError)| {
                 !matches!(problem, DatasetError::Files(FilesError::Missing { content: "images", .. }))
             };

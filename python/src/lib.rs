@@ -1,4 +1,4 @@
-//! The Python module `morphcog._morphcog`; what users import stands in `morphcog/__init__.py`.
+//! The Python module `morphcog._morphcog`; `morphcog/__init__.py` has what users import.
 
 mod remedies;
 
@@ -54,19 +54,19 @@ mod exceptions {
     create_exception!(morphcog, Unstable, Error, "A simulation became unstable and ended.");
 }
 
-/// Width of a robot's picture in a notebook, pixels.
+/// Width of a robot's picture in a notebook \[pixels\].
 const WIDTH: u32 = 480;
 
 /// Images and labels.
 type Labelled<'py> = (Bound<'py, PyArray3<u8>>, Bound<'py, PyArray1<u8>>);
 
-/// How often Ctrl-C is looked for.
+/// Interval between checks for Ctrl-C.
 const WATCH: Duration = Duration::from_millis(50);
 
-/// Control steps of a world from one look for Ctrl-C to the next.
+/// Control steps of a world between checks for Ctrl-C.
 const STEPS: u64 = 20;
 
-/// An error and what to do about it, in Python's words.
+/// Converts an error and its remedies to a Python exception.
 fn raised(error: &Error) -> PyErr {
     let text = remedies::explained(error);
     match error.kind {
@@ -79,8 +79,8 @@ fn refused(text: impl Into<String>) -> PyErr {
     MorphcogError::new_err(text.into())
 }
 
-/// Refuses a `MORPHCOG_ISA` that this machine cannot follow, and computes as everywhere, whatever
-/// rounding the host has chosen, as long as the value lives.
+/// Refuses a `MORPHCOG_ISA` that this machine cannot follow. While the value lives, rounding is
+/// standard, whatever the host has chosen.
 fn entered() -> PyResult<FloatEnvironment> {
     InstructionSet::asked().map_err(refused)?;
     Ok(FloatEnvironment::standard())
@@ -90,7 +90,7 @@ fn no_memory(what: &str) -> PyErr {
     PyMemoryError::new_err(format!("there is no memory for {what}"))
 }
 
-/// An empty list with room for so many numbers.
+/// Returns an empty list with room for so many numbers.
 fn room<T>(count: Option<usize>, what: &str) -> PyResult<Vec<T>> {
     let mut list = Vec::new();
     count.and_then(|count| list.try_reserve_exact(count).ok()).ok_or_else(|| no_memory(what))?;
@@ -107,12 +107,12 @@ fn check_interrupt(py: Python) -> PyResult<()> {
     }
 }
 
-/// Does `work` on a thread of its own, without Python's lock; Ctrl-C sets its flag.
+/// Runs `work` on its own thread, without Python's lock; Ctrl-C sets its flag.
 fn watched<T: Send>(py: Python, work: impl FnOnce(&AtomicBool) -> T + Send) -> PyResult<T> {
     watched_and(py, |_| Ok(()), work)
 }
 
-/// The same, with `look` called from time to time on this thread; an error of it ends the work, too.
+/// Like [`watched`], but calls `look` repeatedly on this thread; its errors end the work, too.
 fn watched_and<T: Send>(
     py: Python,
     mut look: impl FnMut(Python) -> PyResult<()>,
@@ -154,7 +154,7 @@ fn watched_and<T: Send>(
     })
 }
 
-/// Keeps what a command says while it works, for the thread that called it to pass on.
+/// Collects the messages of a command, for the calling thread to pass on.
 struct Heard {
     began: Instant,
     said: Mutex<Said>,
@@ -162,14 +162,14 @@ struct Heard {
 
 #[derive(Default)]
 struct Said {
-    /// What is not passed on yet: what kind of words, and the words.
+    /// Messages not passed on yet, each with its kind.
     lines: Vec<(&'static str, String)>,
     work: Option<(Work, Recent<u64>)>,
     evolution: Option<Recent<Generation>>,
 }
 
 impl Said {
-    /// Says how far it is now, instead of the last line that did.
+    /// Replaces the last line if it was of progress, else adds one.
     fn moved(&mut self, Words { label, parts }: Words) {
         let line = format!("{label} {}", parts.join(" · "));
         match self.lines.last_mut() {
@@ -179,7 +179,7 @@ impl Said {
     }
 }
 
-/// Kinds of words, as `morphcog/__init__.py` knows them.
+/// Kinds of messages, as in `morphcog/__init__.py`.
 const PROGRESS: &str = "progress";
 const NOTE: &str = "note";
 const WARNING: &str = "warning";
@@ -197,7 +197,7 @@ impl Heard {
         self.began.elapsed().as_secs_f64()
     }
 
-    /// Passes on what was said to a function of Python's.
+    /// Passes the messages to a Python function.
     fn pass_on(&self, listener: &Bound<PyAny>) -> PyResult<()> {
         let lines = std::mem::take(&mut self.said().lines);
         lines.into_iter().try_for_each(|(kind, text)| listener.call1((kind, text)).map(drop))
@@ -235,12 +235,12 @@ impl Observer for Heard {
     }
 }
 
-/// Reads a value that Python gives as text.
+/// Parses a value that Python gives as text.
 fn parsed<T: FromStr<Err: std::fmt::Display>>(keyword: &str, text: &str) -> PyResult<T> {
     text.parse().map_err(|error| refused(format!("{keyword}={text}: {error}")))
 }
 
-/// A body from an array of materials.
+/// Makes a body from an array of materials.
 fn body(voxels: &PyReadonlyArray2<u8>) -> PyResult<Body> {
     let view = voxels.as_array();
     let (height, width) = view.dim();
@@ -267,7 +267,7 @@ fn array<'py>(py: Python<'py>, body: &Body) -> Bound<'py, PyArray2<u8>> {
     )
 }
 
-/// A stimulus from an array in [0, 1] of a body's size.
+/// Makes a stimulus from an array in [0, 1] of a body's size.
 fn seen(pixels: numpy::ndarray::ArrayView2<f64>, body: &Body) -> PyResult<Grid<f64>> {
     let (height, width) = pixels.dim();
     if (height, width) != (body.height(), body.width()) {
@@ -283,7 +283,7 @@ fn seen(pixels: numpy::ndarray::ArrayView2<f64>, body: &Body) -> PyResult<Grid<f
     Ok(Grid::from_fn(height, width, |row, column| pixels[(row, column)]))
 }
 
-/// A config of a run, and what runs of it are called; see `morphcog.Config`.
+/// A config, and the name of its runs; see `morphcog.Config`.
 #[pyclass(frozen, module = "morphcog._morphcog")]
 struct ConfigData {
     inner: config::Config,
@@ -301,7 +301,7 @@ impl ConfigData {
         Ok(ConfigData { inner, name: folder::name_of(&source) })
     }
 
-    /// Reads a config's text, as `to_toml` has it.
+    /// Parses a config from the text of `to_toml`.
     #[staticmethod]
     fn parsed(toml: &str, name: String, set: Vec<String>) -> PyResult<Self> {
         let _environment = entered()?;
@@ -322,7 +322,7 @@ impl ConfigData {
         serde_json::to_string(&self.inner).expect("every field is a number, text, list or table")
     }
 
-    /// Describes it in a few words.
+    /// Describes the config in a few words.
     fn about(&self) -> String {
         let config::Config { seed, generations, body, data, .. } = &self.inner;
         let tasks = self.inner.grouping().expect("a config's groups are checked when it is read");
@@ -341,9 +341,9 @@ impl ConfigData {
 #[pyclass(frozen, module = "morphcog._morphcog")]
 struct RunData {
     run: RunFile,
-    /// As it was given.
+    /// The path as given.
     path: PathBuf,
-    /// The same from everywhere: the present folder may change.
+    /// The absolute path, or a name: the present folder may change.
     place: PathBuf,
 }
 
@@ -367,13 +367,12 @@ impl RunData {
         Ok(RunData { run, path: path.clone(), place })
     }
 
-    /// The path of its run.json from everywhere, or its name.
     #[getter]
     fn place(&self) -> PathBuf {
         self.place.clone()
     }
 
-    /// A hash of all settings that its robots depend on.
+    /// Returns a hash of all settings that its robots depend on.
     fn settings(&self) -> String {
         sha256_hex(format!("{:?}", self.run.config.settings()).as_bytes())
     }
@@ -393,12 +392,12 @@ impl RunData {
         self.run.generations
     }
 
-    /// The elites as CSV.
+    /// Returns the elites as CSV.
     fn elites_csv(&self) -> String {
         String::from_utf8_lossy(&self.run.to_csv()).into_owned()
     }
 
-    /// Id, task, objective and body of a robot.
+    /// Returns id, task, objective and body of a robot.
     fn robot<'py>(
         &self,
         py: Python<'py>,
@@ -414,13 +413,13 @@ impl RunData {
         Ok((elite.id.clone(), elite.task.clone(), elite.objective, array(py, &elite.body)))
     }
 
-    /// A page on which the robot walks under its training images.
+    /// Returns a page on which the robot walks under its training images.
     fn page(&self, py: Python, robot: String) -> PyResult<String> {
         let _environment = entered()?;
         self.shown(py, robot, |replay, title| Ok(html::page(&replay.recording, title, &replay.about)?))
     }
 
-    /// A small page, and a picture of the last moment, a GIF.
+    /// Returns a small page, and a GIF of the last moment.
     fn small_page<'py>(&self, py: Python<'py>, robot: String) -> PyResult<(String, Bound<'py, PyBytes>)> {
         let _environment = entered()?;
         let (page, still) = self.shown(py, robot, |replay, title| {
@@ -431,7 +430,7 @@ impl RunData {
         Ok((page, PyBytes::new(py, &still)))
     }
 
-    /// Tests robots, as `morphcog eval`; where the table is.
+    /// Tests robots as `morphcog eval` does, and returns the path of the table.
     #[allow(clippy::too_many_arguments)] // Python's keywords
     fn evaluate(
         &self,
@@ -462,7 +461,7 @@ impl RunData {
         written(unwritten, &options.out)
     }
 
-    /// Audits robots, as `morphcog audit`; where the table is.
+    /// Audits robots as `morphcog audit` does, and returns the path of the table.
     fn audit(
         &self,
         py: Python,
@@ -502,7 +501,7 @@ impl RunData {
 }
 
 impl RunData {
-    /// Records a robot and makes something of it; `make` takes the recording and its title.
+    /// Records a robot, and passes the recording and its title to `make`.
     fn shown<T: Send>(
         &self,
         py: Python,
@@ -522,7 +521,7 @@ impl RunData {
     }
 }
 
-/// Does what a command does; what it says goes to a function of Python's.
+/// Runs a command, and passes its messages to a Python function.
 fn heard<T: Send>(
     py: Python,
     listener: &Bound<PyAny>,
@@ -538,7 +537,7 @@ fn heard<T: Send>(
     found.map_err(|error| raised(&error))
 }
 
-/// The table beside results, if they could be written.
+/// Returns the path of the table beside results, or the error of writing them.
 fn written(unwritten: Option<Error>, out: &Path) -> PyResult<PathBuf> {
     match unwritten {
         Some(error) => Err(raised(&error)),
@@ -553,7 +552,7 @@ fn setting(config: Option<&ConfigData>) -> (Physics, Protocol) {
     }
 }
 
-/// Evolves; see `morphcog.evolve`. The run's folder.
+/// Evolves, and returns the run's folder; see `morphcog.evolve`.
 #[pyfunction]
 #[pyo3(signature = (config, out, resume, force, data, threads, listener))]
 #[allow(clippy::too_many_arguments)] // Python's keywords
@@ -585,7 +584,7 @@ fn evolve_run(
     }
 }
 
-/// Images as sensors see them; see `morphcog.stimuli`.
+/// Returns images as sensors see them; see `morphcog.stimuli`.
 #[pyfunction]
 fn stimuli<'py>(
     py: Python<'py>,
@@ -603,7 +602,7 @@ fn stimuli<'py>(
             .map_err(|error| refused(format!("{}: {error}", error.key())))
     };
     let all = watched(py, |stop| -> PyResult<Vec<f64>> {
-        // Images that cannot be seen are refused before there is room for all.
+        // Images that cannot be seen must be refused before memory is taken for all.
         if count > 0 {
             seen(0)?;
         }
@@ -617,7 +616,7 @@ fn stimuli<'py>(
     Ok(PyArray3::from_owned_array(py, array))
 }
 
-/// Images and labels of a dataset; see `morphcog.images`.
+/// Returns images and labels of a dataset; see `morphcog.images`.
 #[pyfunction]
 fn images<'py>(
     py: Python<'py>,
@@ -652,7 +651,7 @@ fn images<'py>(
     Ok((PyArray3::from_owned_array(py, pixels.expect("images of one size")), PyArray1::from_vec(py, labels)))
 }
 
-/// Displacements; see `morphcog.displacements`.
+/// Returns displacements; see `morphcog.displacements`.
 #[pyfunction]
 #[pyo3(signature = (bodies, stimuli, control_steps, config, threads))]
 fn displacements<'py>(
@@ -675,7 +674,7 @@ fn displacements<'py>(
             .map_err(|error| refused(format!("image {number}, body {place}: {}", error.value(py))))
     };
     let (count, shown) = (bodies.len(), stimuli.shape()[0]);
-    // All bodies must be of one size: what the first one sees is what all see.
+    // All bodies must have one size, as the stimuli of the first are used for all.
     let size = |body: &Body| (body.height(), body.width());
     if let Some(place) = bodies.iter().position(|body| size(body) != size(&bodies[0]))
         && shown > 0
@@ -687,7 +686,7 @@ fn displacements<'py>(
     if shown_to_any > 0 {
         seen_by(0, 0)?;
     }
-    // Asked for as a whole: what the images take one by one could not be refused.
+    // Tried as a whole, since a lack of memory for single images could not be reported.
     drop(room::<(Grid<f64>, f64)>(Some(shown_to_any), "the stimuli")?);
     drop(room::<f64>(Some(stimuli.len()), "the stimuli")?);
     let images = (0..shown_to_any).map(|number| seen_by(number, 0)).collect::<PyResult<Vec<Grid<f64>>>>()?;
@@ -706,7 +705,7 @@ fn displacements<'py>(
     Ok(PyArray2::from_owned_array(py, array))
 }
 
-/// One simulation; see `morphcog.World`. Between two looks for Ctrl-C others may read or change it.
+/// One simulation; see `morphcog.World`. Between checks for Ctrl-C others may read or change it.
 #[pyclass(frozen, module = "morphcog._morphcog")]
 struct WorldData {
     simulation: Mutex<Simulation>,
@@ -740,7 +739,7 @@ impl WorldData {
         Ok(WorldData { simulation: Mutex::new(Simulation { world, unstable: None }), body })
     }
 
-    /// Another one that is as this one is now.
+    /// Returns a copy in its present state.
     fn copied(&self, py: Python) -> Self {
         WorldData { simulation: Mutex::new(self.simulation(py).clone()), body: self.body.clone() }
     }
@@ -754,7 +753,7 @@ impl WorldData {
 
     fn step(&self, py: Python, count: u64) -> PyResult<()> {
         let _environment = entered()?;
-        // A part at a time, so that Ctrl-C is seen; a control step takes milliseconds at most.
+        // In parts, to check for Ctrl-C; a control step takes milliseconds at most.
         let mut left = count;
         loop {
             let steps = left.min(STEPS);
@@ -778,7 +777,7 @@ impl WorldData {
         self.simulation(py).world.control_step()
     }
 
-    /// Centre of mass, voxel lengths.
+    /// Returns the centre of mass \[voxel lengths\].
     #[getter]
     fn centre(&self, py: Python) -> [f64; 2] {
         let _environment = FloatEnvironment::standard();
@@ -786,7 +785,7 @@ impl WorldData {
         simulation.lengths(simulation.world.centre_of_mass())
     }
 
-    /// Points, voxel lengths.
+    /// Returns the points \[voxel lengths\].
     #[getter]
     fn points<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         let _environment = FloatEnvironment::standard();
@@ -797,7 +796,7 @@ impl WorldData {
         PyArray2::from_owned_array(py, array.expect("two coordinates a point"))
     }
 
-    /// Corners of every voxel as indices into the points, clockwise from the top left.
+    /// Returns the corners of each voxel as indices of points, clockwise from the top left.
     #[getter]
     fn voxels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<usize>> {
         let corners: Vec<usize> =
@@ -808,7 +807,7 @@ impl WorldData {
 }
 
 impl WorldData {
-    /// The simulation, without waiting for a thread that needs Python's lock.
+    /// Locks the simulation, without waiting for a thread that needs Python's lock.
     fn simulation(&self, py: Python) -> MutexGuard<'_, Simulation> {
         self.simulation.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner)
     }
@@ -819,7 +818,7 @@ impl WorldData {
 }
 
 impl Simulation {
-    /// Control steps; why it is unstable, if it is.
+    /// Takes control steps; fails with the reason if it is unstable.
     fn step(&mut self, count: u64) -> Result<(), String> {
         if let Some(text) = &self.unstable {
             return Err(format!("{text}; begin anew with reset()"));
@@ -829,15 +828,15 @@ impl Simulation {
         stepped
     }
 
-    /// A place in voxel lengths, y from the ground.
+    /// Converts a position to voxel lengths, with y from the ground.
     fn lengths(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let physics = self.world.system().physics();
         [x / physics.cell_size, y / physics.cell_size - f64::from(physics.ground_row)]
     }
 }
 
-/// Runs the command line with these arguments, the program's name first; its exit code. `program` is
-/// how a shell calls it.
+/// Runs the command line with these arguments, the program's name first, and returns its exit code.
+/// `program` has the words that call it in a shell.
 #[pyfunction]
 fn command(py: Python, arguments: Vec<std::ffi::OsString>, program: String) -> u8 {
     morphcog::cli::called(program);

@@ -1,13 +1,13 @@
-//! Errors in the words of this module: which keyword they are about, and what to do.
+//! Errors in terms of this module: the keyword concerned, and the remedies.
 
 use morphcog::base::error::{Argument, Error};
 use morphcog::base::remedy::Remedy;
 use morphcog::cli::explain::spell;
 
-/// An error and what to do about it.
+/// Returns the text of an error and its remedies.
 pub(crate) fn explained(error: &Error) -> String {
     let mut text = match &error.argument {
-        // Changes of a config say themselves what they set.
+        // Errors in changes of a config name the key themselves.
         Some(Argument { name: "set", value: Some(value) }) => format!("{value}: {}", error.message),
         Some(Argument { name, value: Some(value) }) => format!("{name}={value}: {}", error.message),
         Some(Argument { name, value: None }) => format!("{name}: {}", error.message),

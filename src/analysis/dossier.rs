@@ -1,4 +1,4 @@
-//! `morphcog report`: gathers what is known of runs, for a page.
+//! `morphcog report`: collects the results of runs for a page.
 
 use crate::analysis::progress::Progress;
 use crate::base::error::Error;
@@ -28,24 +28,24 @@ const MOST_PLACES: usize = 50_000_000;
 /// Most images in the rollouts of a page: one of each class, if there are more.
 const MOST_IMAGES: usize = 4;
 
-/// All that is known of a run.
+/// All results of a run.
 #[derive(Clone, Debug)]
 pub struct Dossier {
     /// Its run.json.
     pub path: PathBuf,
-    /// How many runs before it have its name and seed; none if it is the only one.
+    /// Number of earlier runs with its name and seed; `None` if it is the only one.
     pub namesake: Option<usize>,
     /// The run.
     pub run: RunFile,
-    /// How it came along; none without a metrics.csv.
+    /// Its progress; `None` without a metrics.csv.
     pub progress: Option<Progress>,
-    /// What was found of it, and of nothing else.
+    /// Results of this run alone.
     pub findings: Findings,
-    /// What its robots are shown on the page.
+    /// Images for its robots on the page.
     pub images: Vec<Seen>,
 }
 
-/// What tests found; none of what was not done.
+/// Results of tests; `None` for those not done.
 #[derive(Clone, Debug, Default)]
 pub struct Findings {
     /// From `eval`.
@@ -57,8 +57,8 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// Those that are about these runs as they are, where results of these archives go; verdicts are
-    /// on one run.
+    /// Reads results that match the present state of these runs, from the place of these archives'
+    /// results. Only a single run has verdicts.
     fn read(archives: &[PathBuf], runs: &[&RunFile], warn: &dyn Fn(&str)) -> Self {
         let existing = |name: &str| Some(folder::beside_all(archives, name)).filter(|path| exists(path));
         // A report of what can be read is better than none.
@@ -88,37 +88,37 @@ impl Findings {
     }
 }
 
-/// A team of robots of the runs, and images to watch it by.
+/// A team of robots of the runs, and images to watch it with.
 #[derive(Clone, Debug)]
 pub struct Team {
-    /// What `team` found.
+    /// Results of `team`.
     pub file: TeamFile,
     /// The run of each of its robots.
     pub runs: Vec<usize>,
-    /// Images to watch it by, the first of each class: places among the file's images.
+    /// Images to watch it with, the first of each class: positions among the file's images.
     pub images: Vec<usize>,
-    /// What the robots of each run see of these.
+    /// These images as the robots of each run see them.
     pub seen: Vec<Vec<Seen>>,
-    /// What all of them see together.
+    /// These images as all robots see them together.
     pub together: Vec<Seen>,
 }
 
-/// Everything for a page.
+/// All data of a page.
 #[derive(Clone, Debug)]
 pub struct Gathered {
     /// The runs.
     pub runs: Vec<Dossier>,
-    /// What was found of several runs together, above their folders.
+    /// Results of several runs together, from above their folders.
     pub together: Findings,
-    /// What `team` found of robots of these runs, there, too.
+    /// Results of `team` for robots of these runs, from there too.
     pub team: Option<Team>,
 }
 
-/// Reads runs and what lies beside them; `warn` is told what cannot be read. Without `with_rollouts`
-/// no images are needed.
+/// Reads runs and the results beside them; unreadable results go to `warn`. Without
+/// `with_rollouts`, no images are needed.
 ///
 /// # Errors
-/// What is wrong with a run, or with its images.
+/// Returns an error if a run or its images are wrong.
 pub fn gather(
     archives: &[PathBuf],
     data: Option<&Path>,
@@ -165,8 +165,7 @@ pub fn gather(
 }
 
 impl Team {
-    /// The team of a file, if it has answered and all its robots are of these runs. Without
-    /// `whereabouts` there are no images to watch it by.
+    /// Reads a team that has answered, all of these runs; without `whereabouts`, it has no images.
     fn read(path: &Path, runs: &[Dossier], whereabouts: Option<&Whereabouts>) -> Result<Self, Error> {
         let file = TeamFile::read(path)?;
         let wrong = |text: &str| Error::input(format!("{}: {text}", path.display()));
@@ -212,7 +211,7 @@ impl Team {
         Ok(Team { file, runs: of, images, seen, together })
     }
 
-    /// The rollout of a member under one of the images to watch it by.
+    /// Records the rollout of a member under one of the images to watch it with.
     pub fn record(&self, runs: &[Dossier], member: usize, image: usize) -> Recording {
         let run = self.runs[member];
         let config = &runs[run].run.config;
@@ -223,7 +222,7 @@ impl Team {
     }
 }
 
-/// The training images, or one of each class if they are many.
+/// Returns the training images, or one per class if there are many.
 fn images(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Vec<Seen>, Error> {
     let without = |error: Error| match error.remedies.is_empty() {
         true => error.remedy(Remedy::LeaveOutRollouts),
@@ -268,7 +267,7 @@ pub(crate) fn check_length(config: &Config, images: usize) -> Result<(), Error> 
 }
 
 impl Dossier {
-    /// The rollout of a robot under the images.
+    /// Records the rollout of a robot under the images.
     pub fn record(&self, robot: &Robot) -> Recording {
         let config = &self.run.config;
         let fresh = config.protocol.rollout == RolloutMode::Fresh;
@@ -277,13 +276,13 @@ impl Dossier {
         Recording { judge: self.run.judge(robot), ..recording }
     }
 
-    /// Seconds that the run took, and offspring it made; none without a metrics.csv.
+    /// Returns the seconds of the run and its number of offspring; `None` without a metrics.csv.
     pub fn effort(&self) -> Option<(f64, f64)> {
         let last = self.progress.as_ref()?.moments.last()?;
         Some((last.seconds, last.evaluations))
     }
 
-    /// Robots that differ most from each other: the fittest, then in turn the one whose body is
+    /// Returns the robots that differ most: the fittest, then in turn the one whose body is
     /// farthest from all before (in voxels that differ), among those fitter than 0.
     pub fn most_different(&self, count: usize) -> Vec<&Robot> {
         let able = || self.run.elites.iter().filter(|robot| robot.objective > 0.0);
@@ -301,7 +300,7 @@ impl Dossier {
     }
 }
 
-/// Voxels in which two bodies of a size differ.
+/// Counts the voxels in which two bodies of one size differ.
 fn distance(a: &Robot, b: &Robot) -> usize {
     a.body.voxels().cells().iter().zip(b.body.voxels().cells()).filter(|(a, b)| a != b).count()
 }

@@ -1,4 +1,4 @@
-//! The words of the command line: clap's types, help and examples.
+//! Arguments of the command line: clap's types, help and examples.
 
 use crate::cli::audit::AuditArgs;
 use crate::cli::capacity::CapacityArgs;
@@ -33,9 +33,9 @@ use std::path::PathBuf;
 
 /// Evolve soft robots whose bodies alone recognise images.
 ///
-/// Voxels that oscillate, voxels that swell or shrink with one pixel and passive voxels are put
-/// together by evolution so that the robot walks one way when it sees a zero and the other way when
-/// it sees a one: no neurons, no controller.
+/// Evolution combines voxels that oscillate, voxels that swell or shrink with one pixel, and
+/// passive voxels, so that the robot walks one way when it sees a zero and the other way when it
+/// sees a one: no neurons, no controller.
 #[derive(Debug, Parser)]
 #[command(name = "morphcog", version, after_help = EXAMPLES, max_term_width = 80)]
 pub struct Cli {
@@ -49,12 +49,12 @@ pub struct Cli {
     pub(super) json: bool,
 }
 
-/// What is said of a robot where one is shown: as of several.
+/// Help for commands that show one robot; that for several is in `choice`.
 const ROBOT: &str = "Which robot: best (first on validation images if the run ranked robots by them, else \
 the fittest), an id or the beginning of one; top:1, random:1 or best-validation:1 (of each task) if that is one \
 robot; without --archive also the name of a published robot";
 
-/// What is said of `--set`.
+/// Help for `--set`.
 pub(super) const SET: &str = "Change a key, such as map_elites.parents=10 or task.groups.2=[1,2] (items are counted \
 from 1); without a value, such as data.train_images=, it is reset to its default; may be given several times";
 
@@ -104,10 +104,10 @@ Examples:
 Ctrl-C (or SIGTERM, SIGUSR1, SIGHUP) drops the generation under way, saves and exits with 75; a \
 second Ctrl-C ends at once.")]
     Evolve(EvolveArgs),
-    /// Measure how far each soft voxel and sensor of a robot moves it, and what it could be taught.
+    /// Measure how far each soft voxel and sensor moves a robot, and what training could reach.
     #[command(after_help = response::EXAMPLES)]
     Response(ResponseArgs),
-    /// Teach the gaits of an archive to tell two groups of images apart.
+    /// Train the gaits of an archive to tell two groups of images apart.
     #[command(after_help = train::EXAMPLES)]
     Train(TrainArgs),
     /// Test robots on held-out images.
@@ -124,7 +124,7 @@ Examples:
   # the robots published with the paper
   morphcog eval --robots gallery")]
     Eval(EvalArgs),
-    /// Let robots of several runs answer together which class an image is of.
+    /// Let robots of several runs classify images together.
     #[command(after_help = team::EXAMPLES)]
     Team(TeamArgs),
     /// Check whether robots walk or exploit the simulator.
@@ -192,10 +192,10 @@ Examples:
         #[command(subcommand)]
         command: DataCommand,
     },
-    /// The robots published with the paper.
+    /// List the robots published with the paper.
     #[command(after_help = "Examples:\n  morphcog gallery\n  morphcog replay --robot XFJPI")]
     Gallery,
-    /// The built-in configs: list them, or print one to start your own from.
+    /// List the built-in configs, or print one to start your own from.
     #[command(after_help = "Examples:\n  morphcog config\n  morphcog config zero_one.toml > mine.toml")]
     Config {
         /// Name of a built-in config, or a file: printed with its defaults.
@@ -204,7 +204,7 @@ Examples:
         #[arg(long, value_name = "KEY=VALUE", requires = "name", help = SET)]
         set: Vec<String>,
     },
-    /// JSON Schemas of configs and results, for editors and validators: list them, or print one.
+    /// List the JSON Schemas of configs and results, for editors and validators, or print one.
     #[command(
         after_help = "Examples:\n  morphcog schema\n  morphcog schema config > morphcog-config.schema.json"
     )]
@@ -213,7 +213,7 @@ Examples:
         #[arg(value_parser = offering(schema::ALL.map(|schema| schema.name), StringValueParser::new()))]
         name: Option<String>,
     },
-    /// Completions for a shell.
+    /// Print completions for a shell.
     #[command(
         after_help = "Example:\n  morphcog completions bash \\\n    > ~/.local/share/bash-completion/completions/morphcog"
     )]
@@ -221,7 +221,7 @@ Examples:
         /// The shell.
         shell: clap_complete::Shell,
     },
-    /// The man pages.
+    /// Write the man pages.
     #[command(after_help = "\
 Examples:
   morphcog man > morphcog.1 && man ./morphcog.1
@@ -232,10 +232,10 @@ Examples:
         #[arg(short, long, value_name = "DIR")]
         out: Option<PathBuf>,
     },
-    /// How fast this machine simulates.
+    /// Measure how fast this machine simulates.
     ///
-    /// Measures the processor time of one thread, which other work on the machine hardly affects.
-    /// Where the system does not report it (Windows), it is wall-clock time, and the output says so.
+    /// It takes the processor time of one thread, which other work on the machine hardly affects.
+    /// Where the system does not report that (Windows), it takes wall-clock time, and says so.
     #[command(after_help = "Examples:\n  morphcog bench\n  morphcog bench --all")]
     Bench {
         /// Every instruction set of this machine, not only the one in use.
@@ -245,7 +245,7 @@ Examples:
 }
 
 impl Command {
-    /// Tells the commands that take so long that several processes may be meant to share them.
+    /// Returns true for commands so long that several processes may be meant to share them.
     pub(super) fn is_long(&self) -> bool {
         matches!(
             self,
@@ -292,7 +292,7 @@ pub(super) struct EvolveArgs {
     /// Replace the run in the folder.
     #[arg(long)]
     pub(super) force: bool,
-    /// Afterwards, train the fittest gaits to tell the config's two groups apart, as morphcog train does.
+    /// Then train the fittest gaits to tell the config's two groups apart, as morphcog train does.
     #[arg(long)]
     pub(super) train: bool,
     /// At the end, replay the best robot into its run folder.
@@ -304,16 +304,16 @@ pub(super) struct EvolveArgs {
 pub(super) struct EvalArgs {
     #[command(flatten)]
     pub(super) archives: Archives,
-    /// Number of images in all, as many of each class; or "all": every image of the classes.
+    /// Number of images in all, equally many per class; or "all": every image of the classes.
     #[arg(short = 'n', long, default_value_t = HowMany::Evenly(1000))]
     pub(super) images: HowMany,
     /// Which images: test, or validation (of the training split, neither trained on nor chosen
-    /// from), to compare robots while the test images stay unseen.
+    /// from), to compare robots while the test images stay unused.
     #[arg(long, default_value_t = HeldOut::Test, value_name = "SPLIT", value_parser = held_out())]
     pub(super) split: HeldOut,
     #[arg(short, long, visible_aliases = ["robot", "select"], default_value = "top:10", help = ROBOTS)]
     pub(super) robots: Vec<Selection>,
-    /// Validation images in all, for best-validation (default: those of the config, or 400).
+    /// Number of validation images for best-validation (default: that of the config, or 400).
     #[arg(long, value_name = "IMAGES", value_parser = whole::<u32>(1..=1_000_000))]
     pub(super) validation: Option<u32>,
     /// Only robots that morphcog audit found physical.
@@ -322,7 +322,7 @@ pub(super) struct EvalArgs {
     /// Random seed for drawing images, and robots with random:N.
     #[arg(long, default_value_t = 1, value_parser = seed())]
     pub(super) seed: u64,
-    /// A dataset other than the run's, such as builtin: its test images are shown.
+    /// A dataset other than the run's, such as builtin, whose test images are used.
     #[arg(long, value_name = "NAME")]
     pub(super) dataset: Option<String>,
     /// Displacements up to this many voxel lengths are wrong.
@@ -365,24 +365,24 @@ pub(super) struct ReplayArgs {
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
     pub(super) data: Option<PathBuf>,
-    /// What to make, separated by commas (default: gif,html).
+    /// Formats to make, separated by commas (default: gif,html).
     #[arg(short, long, value_delimiter = ',', value_parser = offering(FORMATS, str::parse::<Format>))]
     pub(super) format: Vec<Format>,
-    /// File; its ending (.gif, .html, .png) says the format (default: replay-<robot> beside
+    /// File; its ending (.gif, .html, .png) sets the format (default: replay-<robot> beside
     /// run.json).
     #[arg(short, long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
     /// Width of GIF and PNG in pixels.
     #[arg(long, default_value_t = 480, value_parser = whole::<u32>(0..=MOST))]
     pub(super) width: u32,
-    /// Control steps from one frame of the GIF to the next: 1 is the robot's own time, more is
-    /// faster and a smaller file.
+    /// Control steps per frame of the GIF: 1 is the robot's own time, more is faster and a smaller
+    /// file.
     #[arg(long, default_value_t = 1, value_parser = whole::<u16>(1..=500))]
     pub(super) every: u16,
     /// Frames of the GIF per second: 25 with --every 2 is the robot's own time in half the frames.
     #[arg(long, default_value_t = 50, value_parser = whole::<u32>(1..=50))]
     pub(super) fps: u32,
-    /// How GIF and PNG draw the world: plain, or as in the paper's videos.
+    /// Style of GIF and PNG: plain, or as in the paper's videos.
     #[arg(long, default_value_t = Look::Plain, value_parser = offering(["plain", "paper"], str::parse::<Look>))]
     pub(super) look: Look,
     /// Open the result.
@@ -397,7 +397,7 @@ pub(super) struct SimulateArgs {
     /// CSV file (default: standard output).
     #[arg(short, long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
-    /// Write every point and every pixel, too.
+    /// Write every point and every pixel as well.
     #[arg(long)]
     pub(super) points: bool,
 }
@@ -409,7 +409,7 @@ pub(super) enum DataCommand {
         after_help = "Examples:\n  morphcog data fetch\n  morphcog data fetch fashion-mnist --to ~/data/fashion"
     )]
     Fetch {
-        /// What to download.
+        /// Name of the dataset to download.
         #[arg(default_value = "mnist", value_parser = offering(FETCHABLE, StringValueParser::new()))]
         dataset: String,
         /// Folder (default: data/<dataset>).
@@ -418,7 +418,7 @@ pub(super) enum DataCommand {
         /// Address of a folder with the files, instead of the well-known mirrors.
         #[arg(long, value_name = "URL")]
         mirror: Option<String>,
-        /// Replace files that are there but differ.
+        /// Replace existing files that differ.
         #[arg(long)]
         force: bool,
     },
@@ -427,7 +427,7 @@ pub(super) enum DataCommand {
         after_help = "Examples:\n  morphcog data info\n  morphcog data info emnist-digits --data ~/data/emnist"
     )]
     Info(DatasetArgs),
-    /// A contact sheet: images side by side.
+    /// Make a contact sheet: images side by side.
     #[command(after_help = "Example:\n  morphcog data sheet builtin -o sheet.png")]
     Sheet {
         #[command(flatten)]
@@ -452,7 +452,7 @@ pub(super) struct DatasetArgs {
     /// Folder with the files.
     #[arg(long, value_name = "DIR")]
     pub(super) data: Option<PathBuf>,
-    /// Exchange rows and columns of the images, as data.transpose: true or false (default: EMNIST's).
+    /// Swap rows and columns of the images, as data.transpose: true or false (default: EMNIST's).
     #[arg(long, value_name = "BOOL")]
     pub(super) transpose: Option<bool>,
 }
@@ -460,19 +460,18 @@ pub(super) struct DatasetArgs {
 /// Formats of moving pictures.
 const FORMATS: [&str; 4] = ["gif", "html", "png", "terminal"];
 
-/// Reads the name of a built-in config, or of a file.
 fn config_or_file() -> impl TypedValueParser<Value = String> {
     let names = config::BUILT_IN.map(|(name, _)| name);
     offering(names.into_iter().chain([PAPER_TOML.0]), StringValueParser::new())
 }
 
-/// Reads the name of a dataset, which may be the user's own.
+/// Parses the name of a dataset, which may be the user's own.
 fn dataset() -> impl TypedValueParser<Value = String> {
     offering([BUILTIN].into_iter().chain(FETCHABLE), StringValueParser::new())
 }
 
 impl Cli {
-    /// How the console is to speak.
+    /// Returns the mode of the console.
     pub fn mode(&self) -> Mode {
         match (self.quiet, self.json) {
             (true, _) => Mode::Quiet,
@@ -488,7 +487,7 @@ mod tests {
     use crate::cli::values::with_negative_numbers;
     use clap::{Command, CommandFactory};
 
-    /// The commands in the examples of a help, as a shell reads them.
+    /// Returns the commands in the examples of a help text, as a shell reads them.
     fn examples(help: &str) -> Vec<Vec<String>> {
         let help = help.replace(" \\\n", " ").replace(" |\n", " | ");
         let lines = help.lines().filter(|line| line.starts_with("  ") && !line.trim_start().starts_with('#'));

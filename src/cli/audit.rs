@@ -1,4 +1,4 @@
-//! `morphcog audit`: its words, and what it calls.
+//! `morphcog audit`: parses its arguments and runs it.
 
 use crate::base::error::Error;
 use crate::base::ranks::Ranks;
@@ -50,11 +50,11 @@ pub(super) struct AuditArgs {
     /// Criteria: a TOML file (or JSON); missing keys have their defaults.
     #[arg(long, value_name = "FILE")]
     criteria: Option<PathBuf>,
-    /// Change a criterion, such as threshold=2 or perturbations.time_step=[2,4]; without a value, it
-    /// is reset to its default; may be given several times.
+    /// Change a criterion, such as threshold=2 or perturbations.time_step=[2,4]; without a value,
+    /// it is reset to its default; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Audit robots again of which there are verdicts.
+    /// Repeat audits of robots that have verdicts.
     #[arg(long)]
     fresh: bool,
     /// Folder with the images.
@@ -74,7 +74,7 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
     let chosen = selected(args.robots.clone())?.unwrap_or(Selection::All);
     let (archives, chosen) = robots::archives(args.archives.paths(), chosen)?;
     choice::say_simulated(&archives, console);
-    // Which robots to audit is known for all runs before the first rollout.
+    // The robots are chosen from all runs before the first rollout.
     let runs: Vec<StoredRun> = archives.iter().map(|path| robots::open(path)).collect::<Result<_, _>>()?;
     different(runs.iter().map(|source| (source.path.as_path(), &source.run)))?;
     let asked = chosen.of_each(&runs, args.seed)?;
@@ -117,7 +117,6 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
     Ok(())
 }
 
-/// Says which verdicts were there before.
 fn say_known(finished: &Finished, out: &Path, console: &Console) {
     let Finished { known, shipped, .. } = finished;
     if *known == 0 {
@@ -131,7 +130,7 @@ fn say_known(finished: &Finished, out: &Path, console: &Console) {
     console.info(&format!("{robots} audited before ({place}); --fresh audits again"));
 }
 
-/// The best robots on validation images: those found before, or else searched for now.
+/// Returns the best robots on validation images, from earlier results or from a search now.
 fn validated(
     args: &AuditArgs,
     (archive, best): (&Path, usize),

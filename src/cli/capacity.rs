@@ -1,4 +1,4 @@
-//! `morphcog capacity`: its words, and what it calls.
+//! `morphcog capacity`: parses its arguments and runs it.
 
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
@@ -29,7 +29,7 @@ Examples:
 
 #[derive(Debug, Args)]
 pub(super) struct CapacityArgs {
-    /// What morphcog eval wrote (default: eval.json beside the newest run under runs/).
+    /// Result file of morphcog eval (default: eval.json beside the newest run under runs/).
     #[arg(short, long, value_name = "FILE")]
     eval: Option<PathBuf>,
     /// Early stopping uses images of the training split; in the paper it uses the test images.

@@ -1,5 +1,4 @@
-//! What commands have in common that take archives, or robots of them: one rule, and the same words
-//! of help.
+//! Options that choose archives or robots: commands share their rules and their help.
 
 use crate::base::error::Error;
 use crate::base::session::Session;
@@ -20,33 +19,34 @@ use clap::builder::{PathBufValueParser, TypedValueParser};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-/// Archives, of a command that takes several.
+/// Archives, for a command that takes several.
 #[derive(Debug, Args)]
 pub(super) struct Archives {
-    /// A run.json, or its folder, or runs of the gallery or the atlas (gallery:zero_one, atlas:zero_one);
-    /// several may follow, and the option may be repeated (default: the newest under runs/).
+    /// A run.json, or its folder, or runs of the gallery or atlas (gallery:zero_one,
+    /// atlas:zero_one); several may follow, and the option may be repeated (default: the newest
+    /// under runs/).
     #[arg(short, long, value_name = "FILE", value_parser = run_jsons(), num_args = 1..)]
     archive: Vec<Runs>,
 }
 
 impl Archives {
-    /// Every run.json that is meant.
+    /// Returns the path of every run.json.
     pub(super) fn paths(&self) -> Vec<PathBuf> {
         self.archive.iter().flat_map(|Runs(paths)| paths).cloned().collect()
     }
 }
 
-/// What one value means: a run.json, or those of a set of shipped runs.
+/// Value of an option: a run.json, or those of a set of shipped runs.
 #[derive(Clone, Debug)]
 pub(super) struct Runs(pub(super) Vec<PathBuf>);
 
-/// What is said of robots, wherever some are chosen.
+/// Help for options that choose robots.
 pub(super) const ROBOTS: &str = "Which robots: all, top:N or random:N (of each task; of several archives together), \
 best-validation:N (the best of each run and task on validation images), or, separated by commas, ids or \
 beginnings of ids and best (first on validation images if the run ranked robots by them, else the fittest); \
 without --archive also gallery, or names of published robots";
 
-/// The one selection that is meant by those that were given: robots may be named by several.
+/// Merges the given selections into one; only ids and names may be given several times.
 pub(super) fn selected(mut given: Vec<Selection>) -> Result<Option<Selection>, Error> {
     if given.len() < 2 {
         return Ok(given.pop());
@@ -64,7 +64,7 @@ pub(super) fn selected(mut given: Vec<Selection>) -> Result<Option<Selection>, E
     Ok(Some(Selection::Ids(ids)))
 }
 
-/// The robots of a selection, for a command that looks at them one by one.
+/// Returns the robots of a selection, for a command that handles them one by one.
 pub(super) fn one_by_one(
     search: &one_by_one::Options,
     data: Option<PathBuf>,
@@ -72,8 +72,7 @@ pub(super) fn one_by_one(
 ) -> Result<Vec<Named>, Error> {
     let (archives, _) = robots::archives(search.archives.clone(), search.robots.clone())?;
     say_simulated(&archives, console);
-    // Only a search on validation images is stopped in an orderly way: signals end all else at
-    // once.
+    // Only a search on validation images stops in an orderly way; signals end all else at once.
     match search.robots.validated() {
         Some(_) => {
             in_session(console, Resources::of(None, data), |session| one_by_one::named(search, session))
@@ -82,15 +81,15 @@ pub(super) fn one_by_one(
     }
 }
 
-/// Says what is to be known of archives whose robots are simulated again: as [`say_unfinished`] and
-/// [`warn_of_versions`].
+/// Prints the messages of [`say_unfinished`] and [`warn_of_versions`], for commands that simulate
+/// robots of these archives again.
 pub(super) fn say_simulated<'a>(archives: impl IntoIterator<Item = &'a PathBuf> + Clone, console: &Console) {
     say_unfinished(archives.clone(), console);
     warn_of_versions(archives, console);
 }
 
-/// Warns of archives that another version of the program made: here their robots may walk otherwise.
-/// Runs that have names came with this version, whose tests simulate them.
+/// Warns of archives that another version of the program made: their robots may walk differently
+/// here. Named runs came with this version, whose tests simulate them.
 pub(super) fn warn_of_versions<'a>(archives: impl IntoIterator<Item = &'a PathBuf>, console: &Console) {
     let of_others: Vec<(PathBuf, String)> = meant(archives)
         .filter_map(|path| RunFile::other_version(&path).map(|version| (path, version)))
@@ -109,7 +108,7 @@ pub(super) fn warn_of_versions<'a>(archives: impl IntoIterator<Item = &'a PathBu
     ));
 }
 
-/// The paths of these archives, without those that have names; of none, that of the newest run.
+/// Returns the paths of these archives, or of the newest run if there are none; omits named ones.
 fn meant<'a>(archives: impl IntoIterator<Item = &'a PathBuf>) -> impl Iterator<Item = PathBuf> {
     let mut archives: Vec<PathBuf> = archives.into_iter().cloned().collect();
     if archives.is_empty() {
@@ -118,10 +117,10 @@ fn meant<'a>(archives: impl IntoIterator<Item = &'a PathBuf>) -> impl Iterator<I
     archives.into_iter().filter(|path| !shipped::is_named(path))
 }
 
-/// Says of which archives a command reads the robots that there are so far: those whose runs have not
-/// reached their end. Without archives it is the newest run that is meant.
+/// Reports archives whose runs have not ended, since a command reads the robots they have so far.
+/// Without archives, it checks the newest run.
 pub(super) fn say_unfinished<'a>(archives: impl IntoIterator<Item = &'a PathBuf>, console: &Console) {
-    // Those that have names do not go on.
+    // Named runs do not go on.
     for path in meant(archives) {
         if let Some((done, asked)) = RunFile::progress(&path).filter(|(done, asked)| done < asked) {
             console.info(&format!(
@@ -132,12 +131,12 @@ pub(super) fn say_unfinished<'a>(archives: impl IntoIterator<Item = &'a PathBuf>
     }
 }
 
-/// Reads the path of a run.json, or of its folder, or the name of one shipped run.
+/// Parses the path of a run.json, or of its folder, or the name of one shipped run.
 pub(super) fn run_json() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(folder::one_run)
 }
 
-/// Reads the path of a run.json, or of its folder, or the name of shipped runs.
+/// Parses the path of a run.json, or of its folder, or the name of shipped runs.
 pub(super) fn run_jsons() -> impl TypedValueParser<Value = Runs> {
     PathBufValueParser::new().try_map(|path| folder::run_json(path).map(Runs))
 }

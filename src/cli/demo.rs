@@ -1,4 +1,4 @@
-//! `morphcog demo`: its words, and what it calls.
+//! `morphcog demo`: parses its arguments and runs it.
 
 use crate::base::error::{Error, ErrorKind};
 use crate::base::remedy::Remedy;
@@ -36,7 +36,7 @@ then
 digits that the program draws itself. Then the robot is shown 200 digits that it has never seen. \
 Ctrl-C stops it; the same command goes on.";
 
-/// A little of everything: 196 CPU seconds on Zen 3.
+/// Settings of a short training: 196 CPU seconds on Zen 3.
 const LITTLE: [&str; 11] = [
     "data.dataset=builtin",
     "stimulus.encoding=threshold",
@@ -48,11 +48,10 @@ const LITTLE: [&str; 11] = [
     "train.challengers=4",
     "train.images_per_class=500",
     "train.random_images=600",
-    // The test's images say how it went.
+    // The test measures the result, so no images are needed for validation.
     "validation.best=0",
 ];
 
-/// Images of the test.
 const TEST_IMAGES: usize = 200;
 
 #[derive(Debug, Args)]
@@ -109,7 +108,7 @@ pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
     replay_best(&options.out, shown, console)
 }
 
-/// A zero and a one of the test's digits.
+/// Returns a zero and a one of the test digits.
 fn new_digits() -> Result<Vec<Shown>, Error> {
     let digits = Dataset::builtin(BuiltinDigits::default(), &[Split::Test]);
     let digits = digits.map_err(|error| Error::other(error.to_string()))?;
@@ -133,7 +132,7 @@ mod tests {
         let set = LITTLE.map(str::to_string);
         let config = training::config_of(&run.config, &[vec![0], vec![1]], Some(1), &set).unwrap();
         assert_eq!((config.data.dataset.as_str(), config.train.random_images), ("builtin", 600));
-        // After a change of the version, `morphcog response` makes it anew.
+        // After a change of version, `morphcog response` makes it anew.
         let file = ResponseFile::read(&archive.with_file_name(RESPONSE_JSON)).unwrap();
         let conditions: Vec<_> = config.train.perturbations.conditions().collect();
         let probing = Probing::new(&conditions, run.config.seed);

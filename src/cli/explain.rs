@@ -1,4 +1,4 @@
-//! Errors in the words of the command line: which option they are about, and what to type.
+//! Errors in terms of the command line: the option concerned, and the command to type.
 
 use crate::base::error::{Argument, Error};
 use crate::base::remedy::{Invocation, Remedy, Value};
@@ -8,9 +8,9 @@ use std::fmt;
 /// An error as the terminal shows it.
 #[derive(Debug)]
 pub struct Explained {
-    /// What is wrong.
+    /// Description of the problem.
     pub message: String,
-    /// What to do about it.
+    /// Remedies, in one sentence.
     pub hint: Option<String>,
 }
 
@@ -22,7 +22,7 @@ impl fmt::Display for Explained {
 
 impl std::error::Error for Explained {}
 
-/// Puts an error into the words of the command line.
+/// Puts an error into terms of the command line.
 pub fn explain(error: &Error) -> Explained {
     let message = match &error.argument {
         Some(Argument { name, value: Some(value) }) => format!("{} {value}: {}", option(name), error.message),
@@ -32,9 +32,9 @@ pub fn explain(error: &Error) -> Explained {
     Explained { message, hint: hint(&error.remedies) }
 }
 
-/// Remedies as one sentence: "resume it with --resume, or write elsewhere with --out".
+/// Joins remedies into one sentence: "resume it with --resume, or write elsewhere with --out".
 fn hint(remedies: &[Remedy]) -> Option<String> {
-    // What goes on once something else was done is no alternative to it.
+    // A step that follows another remedy is no alternative to it.
     let (last, is_then) = match remedies {
         [.., _, last @ (Remedy::Repeat | Remedy::RepeatResuming)] => (Some(words(last)), true),
         _ => (None, false),
@@ -84,12 +84,11 @@ fn words(remedy: &Remedy) -> String {
     }
 }
 
-/// A field of a command's options as its option.
 fn option(name: &str) -> String {
     format!("--{}", name.replace('_', "-"))
 }
 
-/// A command as it is typed into a shell.
+/// Returns a command as typed into a shell.
 pub fn spell(invocation: &Invocation) -> String {
     let value = |value: &Value| match value {
         Value::Word(word) => quoted(word),

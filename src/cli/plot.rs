@@ -1,4 +1,4 @@
-//! `morphcog plot`: its words, and what it calls.
+//! `morphcog plot`: parses its arguments and runs it.
 
 use crate::base::error::Error;
 use crate::base::session::Session;
@@ -46,7 +46,7 @@ Examples:
 
 #[derive(Debug, Args)]
 pub(super) struct PlotArgs {
-    /// What to show.
+    /// Kind of figure.
     #[arg(value_parser = offering(Kind::ALL.map(|(_, name)| name), str::parse::<Kind>))]
     kind: Kind,
     #[command(flatten)]
@@ -68,14 +68,14 @@ pub(super) struct PlotArgs {
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Control steps between the poses of snapshots (default: as suits the walk).
+    /// Control steps between the poses of snapshots (default: fits the walk).
     #[arg(long, value_parser = whole::<u32>(1..=MOST))]
     every: Option<u32>,
-    /// File; its ending (.svg, .png) says the format (default: both, plot-<kind>[-<robot>] beside
+    /// File; its ending (.svg, .png) sets the format (default: both, plot-<kind>[-<robot>] beside
     /// run.json).
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Resolution of the PNG, pixels per inch (default: 300, or less if a side had over 16000 pixels).
+    /// PNG resolution in pixels per inch (default: 300, or less for a side over 16000 pixels).
     #[arg(long, value_parser = whole::<u32>(36..=2400))]
     dpi: Option<u32>,
     /// Transparent background.

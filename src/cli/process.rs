@@ -1,4 +1,4 @@
-//! The command line as a process: arguments in, exit code out.
+//! Runs the command line as a process: arguments in, exit code out.
 
 use crate::base::error::{Error, ErrorKind};
 use crate::base::ranks::Ranks;
@@ -14,25 +14,24 @@ use std::io;
 use std::sync::OnceLock;
 use std::time::Duration;
 
-/// How this process is called from a shell, if not by its own file.
+/// Words that call this process in a shell, if not its own file.
 static PROGRAM: OnceLock<String> = OnceLock::new();
 
-/// Says how this process is called from a shell, if not by its own file: commands that it prints for
-/// other processes begin so. Only the first call counts.
+/// Sets the words that call this process in a shell, if not its own file. Commands printed for
+/// other processes begin with them. Only the first call counts.
 pub fn called(words: String) {
     PROGRAM.get_or_init(|| words);
 }
 
-/// How this process is called from a shell, if not by its own file.
 pub(super) fn program() -> Option<&'static str> {
     PROGRAM.get().map(String::as_str)
 }
 
-/// How long the leading rank has to say what is wrong before another one that failed does.
+/// Time for the leading rank to report an error, before another rank that failed does.
 const LEAD_SPEAKS: Duration = Duration::from_secs(2);
 
-/// Runs the command line with these arguments, the program's name first; the exit code. Whatever there
-/// is to say is said by then.
+/// Runs the command line with these arguments, the program's name first, and returns the exit code.
+/// By then, everything is printed.
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     signals::heed_file_limit();
     let arguments: Vec<OsString> = arguments.into_iter().collect();
@@ -41,7 +40,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(cli) => cli,
         Err(help) => return say(&help, &arguments),
     };
-    // A program that MPI started may call others that have nothing to do with it.
+    // A program that MPI started may call commands that have nothing to do with it.
     let joined = match cli.command.is_long() {
         true => Ranks::join().map(|(ranks, guard)| (ranks, Some(guard))),
         false => Ok((Ranks::ALONE, None)),
@@ -60,7 +59,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     match run(cli, &console, ranks) {
         Ok(()) => u8::from(console.has_lost_results()),
         Err(error) => {
-            // To stop is what the user asked for, and no error.
+            // The user requested the stop, so it is no error.
             if error.kind == ErrorKind::Stopped {
                 let Explained { message, hint } = explain(&error);
                 console.info(&hint.map_or(message.clone(), |hint| format!("{message}; {hint}")));
@@ -75,7 +74,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     }
 }
 
-/// Ends all ranks when one has failed. What all of them find wrong, the leading one says.
+/// Ends all ranks when one has failed. The leading one reports the errors that all of them find.
 fn failed_among(ranks: Ranks, error: &Error) -> ! {
     if !ranks.leads() {
         std::thread::sleep(LEAD_SPEAKS);
@@ -85,10 +84,10 @@ fn failed_among(ranks: Ranks, error: &Error) -> ! {
     ranks.abort(error.kind.exit_code())
 }
 
-/// Help, the version, or what is wrong with the command line.
+/// Prints help, the version, or an error of the command line, and returns the exit code.
 fn say(help: &clap::Error, arguments: &[OsString]) -> u8 {
     let code = u8::try_from(help.exit_code()).unwrap_or(2);
-    // As names of files that a shell put into the command line.
+    // File names that a shell inserted may have hidden characters.
     let hides_any = arguments.iter().any(|argument| argument.to_string_lossy().contains(is_unseen));
     if help.use_stderr() && hides_any {
         let text = help.to_string();

@@ -1,4 +1,4 @@
-//! `morphcog report`: its words, and what it calls.
+//! `morphcog report`: parses its arguments and runs it.
 
 use crate::analysis::dossier;
 use crate::base::error::Error;
@@ -29,11 +29,11 @@ capacity.json. With several runs, their common results are looked for in the fol
 pub(super) struct ReportArgs {
     #[command(flatten)]
     archives: Archives,
-    /// The same without the option's name, as command lines of before have it.
+    /// Archives without the option's name, as in earlier command lines.
     #[arg(value_parser = run_jsons(), hide = true)]
     runs: Vec<Runs>,
-    /// Robots that can be watched, the fittest of each run; the more, the fewer frames each has
-    /// (the page stays below 20 MB).
+    /// Robots that can be watched, the fittest of each run; with more, each has fewer frames (the
+    /// page stays below 20 MB).
     #[arg(long, value_name = "ROBOTS", default_value_t = 100, value_parser = whole::<usize>(0..=MOST))]
     rollouts: usize,
     /// Folder with the images.
@@ -42,7 +42,7 @@ pub(super) struct ReportArgs {
     /// The page (default: report.html beside run.json, or above several).
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Open it.
+    /// Open the page.
     #[arg(long)]
     open: bool,
 }

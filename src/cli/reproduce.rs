@@ -1,4 +1,4 @@
-//! `morphcog reproduce`: its words, and what it calls.
+//! `morphcog reproduce`: parses its arguments and runs it.
 
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
@@ -32,15 +32,14 @@ pub(super) struct ReproduceArgs {
     /// Plan file (TOML or JSON), or paper.toml, which is built in.
     #[arg(default_value = PAPER_TOML.0)]
     plan: String,
-    /// More than 0, up to 1: generations are multiplied by it, test images and trainings by its
-    /// square root.
+    /// More than 0, up to 1: multiplies generations; its square root, test images and trainings.
     #[arg(long, default_value_t = 1.0, value_parser = decimal())]
     scale: f64,
     /// Change a key, such as seeds=[1,2] or experiment.1.config=mine.toml (experiments are counted
     /// from 1); without a value, it is reset to its default; may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Folder for everything.
+    /// Folder for all results.
     #[arg(short, long, value_name = "DIR", default_value = "reproduction")]
     out: PathBuf,
     #[command(flatten)]

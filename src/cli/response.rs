@@ -1,4 +1,4 @@
-//! `morphcog response`: its words, and what it calls.
+//! `morphcog response`: parses its arguments and runs it.
 
 use crate::base::error::Error;
 use crate::base::text::counted;
@@ -50,15 +50,15 @@ pub(super) struct ResponseArgs {
     /// Only robots that morphcog audit found physical: "best" is the best of them.
     #[arg(long)]
     physical_only: bool,
-    /// Two groups of classes, such as 4|9, 0|123 or 10,11|3 (as in train): says what robots could be
-    /// taught, too.
+    /// Two groups of classes, such as 4|9, 0|123 or 10,11|3 (as in train), to estimate the accuracy
+    /// that training could reach.
     #[arg(short, long, value_name = "A|B")]
     task: Option<Groups>,
-    /// Change a key of the config that a training of the task would have, such as stimulus.margin=5
-    /// or train.windows=2000; may be given several times.
+    /// Change a key of the config for a training of the task, such as stimulus.margin=5 or
+    /// train.windows=2000; may be given several times.
     #[arg(long, value_name = "KEY=VALUE", requires = "task")]
     set: Vec<String>,
-    /// Most rollouts of a robot, each with a random image (60 or more); all earlier ones are reused.
+    /// Most rollouts per robot, each with a random image (60 or more); earlier ones are all reused.
     #[arg(short = 'n', long, default_value_t = 1000, value_parser = whole::<usize>(0..=MOST))]
     images: usize,
     /// Relative error of the slopes at which a robot's measurement ends; 0: only after --images

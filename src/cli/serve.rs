@@ -1,4 +1,4 @@
-//! `morphcog serve`: its words, and what it calls.
+//! `morphcog serve`: parses its arguments and runs it.
 
 use crate::base::error::Error;
 use crate::base::signals;
@@ -42,14 +42,14 @@ pub(super) struct ServeArgs {
     /// Do not open the browser.
     #[arg(long)]
     no_open: bool,
-    /// A name by which the page may be reached besides those of this machine, as that of a proxy.
+    /// A further host name that may reach the page, besides this machine's, such as a proxy's.
     #[arg(long, value_name = "NAME")]
     allow_host: Vec<HostName>,
 }
 
 pub(super) fn run(args: ServeArgs, console: &Console) -> Result<(), Error> {
     let archives = args.archives.paths();
-    // A page without a run is of use, too: the published robots are there.
+    // Without a run, the page still has the published robots.
     let newest = if archives.is_empty() { folder::newest_run().ok() } else { None };
     let stop = signals::stop_flag()?;
     let shown: Vec<_> = archives.iter().chain(&newest).cloned().collect();
@@ -64,7 +64,7 @@ pub(super) fn run(args: ServeArgs, console: &Console) -> Result<(), Error> {
     let url = server.url();
     console.line(&url);
     console.info("Ctrl-C ends it");
-    // Why not is the business of programs that nobody here has asked for.
+    // The reason would name programs that the user never chose.
     if !args.no_open && open::that_detached(&url).is_err() {
         console.warning(&format!("no browser could be opened; open {url} yourself"));
     }

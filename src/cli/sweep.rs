@@ -1,4 +1,4 @@
-//! `morphcog sweep`: its words, and what it calls.
+//! `morphcog sweep`: parses its arguments and runs it.
 
 use crate::base::error::Error;
 use crate::base::shell::{in_shell, quoted};
@@ -48,8 +48,8 @@ tasks are done; 1: some failed; 75: stopped.";
 pub(super) struct SweepArgs {
     /// Plan file (TOML or JSON; morphcog schema sweep has its keys).
     plan: PathBuf,
-    /// Change a key of the plan, such as seeds=[1,2]; without a value, it is reset to its default; may
-    /// be given several times.
+    /// Change a key of the plan, such as seeds=[1,2]; without a value, it is reset to its default;
+    /// may be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Folder for all run folders (default: runs/<plan>).
@@ -57,7 +57,7 @@ pub(super) struct SweepArgs {
     out: Option<PathBuf>,
     #[command(flatten)]
     what: What,
-    /// Gather what all tasks found: sweep.csv, and figures.
+    /// Collect the results of all tasks: sweep.csv, and figures.
     #[arg(long, conflicts_with_all = ["task", "list", "slurm", "status"])]
     collect: bool,
     #[command(flatten)]

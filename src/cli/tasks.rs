@@ -1,4 +1,4 @@
-//! What `sweep` and `reproduce` have in common: one task, all of them, lists, how far they are.
+//! Options that `sweep` and `reproduce` share: to run one task or all, list them or show progress.
 
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
@@ -14,17 +14,17 @@ use crate::shipped::atlas;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
-/// Numbers of tasks that engines give their processes, the innermost engine first.
+/// Variables in which engines number the tasks of their processes, the innermost engine first.
 const NUMBERS: [&str; 3] = ["HQ_TASK_ID", "SLURM_ARRAY_TASK_ID", "PBS_ARRAY_INDEX"];
 
 /// Most tasks of an array job, unless a cluster says otherwise (Slurm's `MaxArraySize`, 1001).
 const MOST_OF_AN_ARRAY: usize = 1000;
 
-/// A task that is stopped by its time limit sooner is not queued again: it spends all its time on
-/// starting.
+/// Seconds that a task must have run to be queued again at its time limit; with less, it would
+/// spend all its time on starting.
 const LEAST_SECONDS: u32 = 10;
 
-/// Without one of these, all tasks are done here.
+/// A request other than to run all tasks here.
 #[derive(Debug, Args)]
 #[group(multiple = false)]
 pub(super) struct What {
@@ -43,7 +43,7 @@ pub(super) struct What {
     pub(super) status: bool,
 }
 
-/// Where, and with what.
+/// Resources of the tasks.
 #[derive(Debug, Args)]
 pub(super) struct Where {
     /// Folder with the images.
@@ -58,30 +58,29 @@ pub(super) struct Where {
 }
 
 impl Where {
-    /// Returns what a session of tasks works with.
+    /// Returns the resources of a session.
     pub(super) fn with(&self) -> Resources {
         Resources::of(self.threads, self.data.clone())
     }
 }
 
-/// A command that does tasks, for other machines to run.
+/// A command that runs tasks, to print for other machines.
 pub(super) struct Command<'a> {
-    /// Its words after the program's name, up to the options that are the same for all such
-    /// commands.
+    /// Its words after the program's name, up to the options that all such commands share.
     pub(super) words: Vec<String>,
     /// Name of the plan.
     pub(super) name: &'a str,
     /// Its tasks.
     pub(super) tasks: &'a [Task],
-    /// Where.
+    /// Place of the tasks.
     pub(super) place: &'a Place,
-    /// With what.
+    /// Resources of the tasks.
     pub(super) with: &'a Where,
 }
 
 impl Command<'_> {
-    /// The whole command but for its number of threads; it depends neither on the present folder
-    /// nor on variables.
+    /// Returns the whole command without its number of threads, independent of the present folder
+    /// and of variables.
     fn line(&self) -> Result<String, Error> {
         let absolute = |path: &Path| std::path::absolute(path).map_err(|error| Error::reading(path, &error));
         let own = || std::env::current_exe().map_err(|error| Error::other(error.to_string()));
@@ -105,8 +104,8 @@ impl Command<'_> {
         Ok(words.join(" "))
     }
 
-    /// The folder that the tasks' images are looked for in from the present one on, if there is one of
-    /// all tasks.
+    /// Returns the default folder of the tasks' images, relative to the present one, if all share
+    /// it.
     fn data_here(&self) -> Option<PathBuf> {
         let mut all = self.tasks.iter().map(Task::data_here);
         let first = all.next()?;
@@ -120,14 +119,14 @@ impl Command<'_> {
         Ok(())
     }
 
-    /// A job script for sbatch.
+    /// Prints a job script for sbatch.
     fn slurm(&self, count: usize, console: &Console) -> Result<(), Error> {
         let out = &self.place.out;
         std::fs::create_dir_all(out).map_err(|error| Error::writing(out, &error))?;
         let out = std::path::absolute(out).map_err(|error| Error::reading(out, &error))?;
         let (name, line, threads) = (self.name, self.line()?, self.with.threads.unwrap_or(1));
         let (name, log) = (quoted(name), out.join("slurm-%a.log"));
-        // Slurm reads its own lines, and no shell's escapes.
+        // Slurm reads these lines itself, without a shell's escapes.
         if [name.as_str(), &in_shell(&log)].iter().any(|word| word.starts_with('$')) {
             let text = format!("--slurm: {}: expected names of plan and folder that are text", log.display());
             return Err(Error::usage(text).advice("rename them, or use --list"));
@@ -182,7 +181,7 @@ exit "$code"
     }
 }
 
-/// Says every error but the last; the last one is for `main`.
+/// Reports every error but the last, which is left to `main`.
 pub(super) fn refused(mut errors: Vec<Error>, console: &Console) -> Error {
     let last = errors.pop().expect("something is refused, and it is said what");
     errors.iter().for_each(|error| console.failed(error));
@@ -197,7 +196,7 @@ pub(super) fn warn_of_gaits(tasks: &[Task], console: &Console) {
     }
 }
 
-/// What is asked for but to do all tasks; whether that is all.
+/// Handles a request other than to run all tasks; returns false if there is none.
 pub(super) fn asked(
     what: &What,
     tasks: &[Task],
@@ -229,7 +228,7 @@ pub(super) fn asked(
     Ok(true)
 }
 
-/// The number that an engine gave to this process.
+/// Returns the number that an engine gave to this process.
 fn from_engine() -> Result<usize, Error> {
     let given = NUMBERS.iter().find_map(|name| Some((name, std::env::var(name).ok()?)));
     let Some((name, value)) = given else {
@@ -239,10 +238,10 @@ fn from_engine() -> Result<usize, Error> {
     value.trim().parse().map_err(|_| Error::usage(format!("{name}={value}: expected the number of a task")))
 }
 
-/// Says how all tasks ended.
+/// Reports how all tasks ended.
 ///
 /// # Errors
-/// If some failed, or were stopped.
+/// Returns an error if some failed or were stopped.
 pub(super) fn ended(summary: &Summary, count: usize) -> Result<(), Error> {
     let Summary { done, failed, elsewhere, open } = summary;
     if !failed.is_empty() {

@@ -1,4 +1,4 @@
-//! `morphcog team`: its words, and what it calls.
+//! `morphcog team`: parses its arguments and runs it.
 
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
@@ -34,7 +34,7 @@ most votes win; in a tie, the class with the largest sum of walks. A second answ
 walks alone. No weight of the votes is trained. team.json keeps every walk: the same command goes on \
 after Ctrl-C, and with more runs.";
 
-/// What is said of `--archive`: elsewhere the newest run is the default.
+/// Help for `--archive`, whose default differs from that of other commands, the newest run.
 const ARCHIVE: &str = "A run.json, or its folder, or runs of the gallery; several may follow, and the option may be \
 repeated (default: gallery:team, a robot for each pair of digits)";
 
@@ -43,7 +43,7 @@ repeated (default: gallery:team, a robot for each pair of digits)";
 pub(super) struct TeamArgs {
     #[command(flatten)]
     archives: Archives,
-    /// Which robots: all, top:N or random:N (of each archive and task), best (of each archive the
+    /// Which robots: all, top:N or random:N (of each archive and task), best (of each archive, the
     /// first on validation images if the run ranked robots by them, else the fittest), or ids or
     /// their beginnings, separated by commas (of all archives) [default: best].
     #[arg(short, long, visible_aliases = ["robot", "select"])]
@@ -51,7 +51,7 @@ pub(super) struct TeamArgs {
     /// Classes to tell apart, such as 0,1,2 (default: all of the dataset).
     #[arg(long, value_delimiter = ',')]
     classes: Vec<u8>,
-    /// Number of images in all, as many of each class; or "all": every image of the classes.
+    /// Number of images in all, equally many per class; or "all": every image of the classes.
     #[arg(short = 'n', long, default_value_t = HowMany::Evenly(1000))]
     images: HowMany,
     /// Which images: test, or validation (of the training split, neither trained on nor chosen

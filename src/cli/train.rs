@@ -1,4 +1,4 @@
-//! `morphcog train`: its words, and what it calls.
+//! `morphcog train`: parses its arguments and runs it.
 
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
@@ -47,8 +47,8 @@ pub(super) struct TrainArgs {
     /// The run.json of the gaits, or its folder (default: the newest under runs/).
     #[arg(short, long, value_name = "FILE", value_parser = run_json())]
     archive: Option<PathBuf>,
-    /// Two groups of classes, such as 4|9 or 0|123. With classes above 9 commas separate them: 10,11|3,
-    /// or "1|26," for 1 against 26.
+    /// Two groups of classes, such as 4|9 or 0|123. Commas separate classes if one is above 9:
+    /// 10,11|3, or "1|26," for 1 against 26.
     #[arg(short, long, value_name = "A|B")]
     task: Groups,
     #[arg(short, long, visible_aliases = ["robot", "select"], default_value = "top:4", help = ROBOTS)]
@@ -96,10 +96,10 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
     trained(&options, Resources::of(args.threads, args.data), console)
 }
 
-/// Gaits that are tried if nothing else is said.
+/// Default number of gaits to try.
 const GAITS: usize = 4;
 
-/// How a training of an archive's gaits is called: after the archive's folder and the task.
+/// Returns the name of a training: the archive's folder and the task.
 fn name(archive: &Path, [a, b]: &[Vec<u8>; 2], seed: Option<u64>) -> String {
     let folder = archive.parent().and_then(Path::file_name).map(|name| name.to_string_lossy());
     let of = match shipped::name(archive) {
@@ -110,11 +110,11 @@ fn name(archive: &Path, [a, b]: &[Vec<u8>; 2], seed: Option<u64>) -> String {
     format!("{of}-{}{seed}", groups_text([a, b], "v"))
 }
 
-/// The training that `evolve --train` does when the gaits of its run have evolved.
+/// Returns the training that `evolve --train` does after the gaits have evolved.
 ///
 /// # Errors
-/// If the config has not two groups, or none that can be trained; if several processes were to share
-/// it, or its folder holds a run already.
+/// Returns an error if the config does not have two groups that can be trained, if several
+/// processes would share the training, or if its folder holds a run.
 pub(super) fn after_evolution(evolution: &evolve::Options, session: &Session) -> Result<Options, Error> {
     let evolve::Options { config, out, if_exists, .. } = evolution;
     if session.ranks.size() > 1 {
@@ -128,7 +128,7 @@ pub(super) fn after_evolution(evolution: &evolve::Options, session: &Session) ->
     let archive = out.join(RUN_JSON);
     let name = name(&archive, groups, None);
     let of_training = out.with_file_name(&name);
-    // What would stop the training is said before gaits evolve for an hour.
+    // Obstacles must be reported before the gaits evolve for an hour.
     let whereabouts = Whereabouts::given(session.folder()).and_of_resumed(*if_exists, &archive);
     training::check(config, groups, &whereabouts)?;
     if *if_exists == IfExists::Refuse {
@@ -146,7 +146,7 @@ pub(super) fn after_evolution(evolution: &evolve::Options, session: &Session) ->
     })
 }
 
-/// Trains, validates and audits, and says how it went.
+/// Trains, validates and audits, and reports the results.
 pub(super) fn trained(options: &Options, with: Resources, console: &Console) -> Result<(), Error> {
     choice::say_simulated([&options.archive], console);
     let finished = in_session(console, with.clone(), |session| training::train(options, session))?;

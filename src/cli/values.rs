@@ -1,5 +1,5 @@
-//! What values of the command line are: words for shells to complete ([`offering`]), and numbers, with
-//! what was expected in their errors.
+//! Values of the command line: words that shells complete ([`offering`]), and numbers whose errors
+//! say what was expected.
 
 use crate::base::threads::MOST_THREADS;
 use crate::config;
@@ -9,8 +9,7 @@ use clap::{Arg, Command};
 use std::ffi::OsStr;
 use std::ops::RangeInclusive;
 
-/// Reads a value as `parser` does, which also says what is wrong with it. Shells offer the words, and
-/// help lists them.
+/// Parses a value with `parser`, which also reports errors. Shells and help list the words.
 pub(super) fn offering<P: TypedValueParser>(
     words: impl IntoIterator<Item = &'static str>,
     parser: P,
@@ -18,7 +17,7 @@ pub(super) fn offering<P: TypedValueParser>(
     Offering { words: words.into_iter().collect(), parser }
 }
 
-/// What [`offering`] makes.
+/// Parser that [`offering`] returns.
 #[derive(Clone)]
 pub(super) struct Offering<P> {
     words: Vec<&'static str>,
@@ -42,15 +41,15 @@ impl<P: TypedValueParser> TypedValueParser for Offering<P> {
     }
 }
 
-/// Reads which images that robots are not trained on.
+/// Parses the split of held-out images.
 pub(super) fn held_out() -> impl TypedValueParser<Value = HeldOut> {
     offering(["test", "validation"], str::parse::<HeldOut>)
 }
 
-/// The most that is read where the program sets no limit, or a lower one elsewhere.
+/// Largest number accepted where the program sets no limit, or a lower one elsewhere.
 pub(super) const MOST: u64 = u32::MAX as u64;
 
-/// Reads a whole number in a range.
+/// Parses a whole number in a range.
 pub(super) fn whole<T>(range: RangeInclusive<u64>) -> impl TypedValueParser<Value = T>
 where
     T: TryFrom<u64> + Clone + Send + Sync + 'static,
@@ -64,17 +63,17 @@ where
     }
 }
 
-/// Reads a seed: a number that a config can keep.
+/// Parses a seed: a number that a config can keep.
 pub(super) fn seed() -> impl TypedValueParser<Value = u64> {
     whole(0..=config::MAX_NUMBER)
 }
 
-/// Reads a number of threads, or of what needs one each.
+/// Parses a number of threads, or of things that need one each.
 pub(super) fn threads() -> impl TypedValueParser<Value = u16> {
     whole(1..=u64::from(MOST_THREADS))
 }
 
-/// Reads a number with decimals.
+/// Parses a number with decimals.
 pub(super) fn decimal() -> impl TypedValueParser<Value = f64> {
     |text: &str| {
         let number = text.parse().ok().filter(|number: &f64| number.is_finite());
@@ -82,8 +81,7 @@ pub(super) fn decimal() -> impl TypedValueParser<Value = f64> {
     }
 }
 
-/// A command whose options take values that look like negative numbers: each says for itself what it
-/// expected.
+/// Lets options take values that look like negative numbers, so that each reports what it expected.
 pub(super) fn with_negative_numbers(command: Command) -> Command {
     let allowing = |argument: Arg| match argument.get_action().takes_values() {
         true => argument.allow_negative_numbers(true),
@@ -98,7 +96,7 @@ mod tests {
     use crate::cli::Cli;
     use clap::CommandFactory;
 
-    /// What is said of a command line.
+    /// Returns the error of a command line, empty if there is none.
     fn said(line: &str) -> String {
         let command = with_negative_numbers(Cli::command());
         let words = std::iter::once("morphcog").chain(line.split_whitespace());

@@ -35,56 +35,56 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Robots that are simulated side by side; finished ones are saved after this many.
+/// Robots simulated side by side; finished ones are saved after each batch.
 const BATCH: usize = 8;
 
-/// Most training images of a class that a robot is audited on: it sees each some twenty times.
+/// Most training images per class in an audit: each is simulated some twenty times.
 const IMAGES_PER_CLASS: usize = 16;
 
-/// What to audit, and how.
+/// Options of an audit.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The run.json.
     pub archive: PathBuf,
-    /// Which of its robots.
+    /// The robots to audit.
     pub robots: Selection,
     /// Seed of `random:N`.
     pub seed: u64,
-    /// How they are judged.
+    /// Criteria of the verdicts.
     pub criteria: Criteria,
-    /// Whether robots are audited again of which there are verdicts.
+    /// True if robots that have verdicts are audited again.
     pub fresh: bool,
-    /// Where the verdicts go (audit.json; audit.csv beside it).
+    /// Path of the verdicts (audit.json; audit.csv goes beside it).
     pub out: PathBuf,
 }
 
-/// An audit's end.
+/// Result of an audit.
 #[derive(Clone, Debug)]
 pub struct Finished {
     /// The content of audit.json.
     pub file: AuditFile,
-    /// Ids of the robots that were asked for.
+    /// Ids of the requested robots.
     pub asked: Vec<String>,
-    /// How many of them were audited before, and not again.
+    /// Number of these that already had verdicts and were skipped.
     pub known: usize,
-    /// Where verdicts on them that came with their run are, if any did.
+    /// Path of the verdicts that came with the run, if any were used.
     pub shipped: Option<PathBuf>,
-    /// Whether a signal stopped it before the last of them.
+    /// True if a signal stopped the audit before its last robot.
     pub stopped: bool,
-    /// Why what was found is not, or not as a whole, in its file, if so.
+    /// The error if the verdicts could not be written, or only in part.
     pub unwritten: Option<Error>,
 }
 
-/// A robot to be audited.
+/// A robot to audit.
 struct Subject {
     id: String,
     task: String,
     body: Body,
-    /// Displacements its run knows.
+    /// Its displacements in the run, if they must be the same here.
     known: Option<Vec<f64>>,
 }
 
-/// What all robots of a source have in common.
+/// The parts of an audit that all robots of a source share.
 struct Trial {
     config: Config,
     grouping: Grouping,
@@ -92,12 +92,12 @@ struct Trial {
     criteria: Criteria,
 }
 
-/// Audits robots. What an earlier audit of the same robots by the same criteria found is kept and
-/// not done again, at the usual place also what came with a named run; the file is the same bytes
-/// however often it was stopped.
+/// Audits robots. It reuses verdicts on the same robots by the same criteria: from the output file
+/// and, at the default path, those that came with a named run. However often it is stopped, the
+/// final file has the same bytes.
 ///
 /// # Errors
-/// What is wrong with archive, data, selection or criteria.
+/// Returns an error if the archive, data, selection or criteria are wrong.
 pub fn audit(options: &Options, session: &Session) -> Result<Finished, Error> {
     let Opened { config, fitness, training, subjects, order, mut file } = open(options, session)?;
     let grouping = config.grouping()?.with_fitness(fitness);
@@ -113,7 +113,7 @@ pub fn audit(options: &Options, session: &Session) -> Result<Finished, Error> {
     file.add_known(&options.out);
     let mut shipped = None;
     if options.out == folder::beside(&options.archive, AUDIT_JSON) {
-        // What came with a named run; of another run this is the same file.
+        // Verdicts that came with a named run; for other runs, this is the same file.
         let (with_it, before) = (options.archive.with_file_name(AUDIT_JSON), file.robots.len());
         file.add_known(&with_it);
         shipped = Some(with_it).filter(|_| file.robots.len() > before);
@@ -150,7 +150,7 @@ pub fn audit(options: &Options, session: &Session) -> Result<Finished, Error> {
             file.robots.retain(|before| before.id != found.id);
             file.robots.push(found);
         }
-        // Another audit of the same run may have written meanwhile.
+        // Another audit of this run may have written meanwhile.
         file.add_known(&options.out);
         file.robots.sort_by_key(|robot| order.iter().position(|id| *id == robot.id));
         if ranks.leads() && !file.robots.is_empty() {
@@ -166,16 +166,15 @@ pub fn audit(options: &Options, session: &Session) -> Result<Finished, Error> {
     Ok(Finished { file, asked, known, shipped, stopped: false, unwritten: unwritten.error() })
 }
 
-/// What an audit begins with.
+/// The inputs of an audit.
 struct Opened {
     config: Config,
     fitness: Fitness,
     training: Training,
-    /// The robots to audit.
     subjects: Vec<Subject>,
-    /// The ids of all robots of the run, in order.
+    /// Ids of all robots of the run, in order.
     order: Vec<String>,
-    /// Without verdicts yet.
+    /// Has no verdicts yet.
     file: AuditFile,
 }
 
@@ -187,8 +186,8 @@ fn open(options: &Options, session: &Session) -> Result<Opened, Error> {
     check_out(&options.out, path, AUDIT_JSON)?;
     let whereabouts = Whereabouts::given(session.folder()).and_of(path);
     let training = training_of(run, path, &whereabouts)?;
-    // A training may have shown images otherwise than the protocol says, which is what is judged;
-    // of published robots only the fitness is known.
+    // A training may have had other conditions than the protocol, which the audit follows;
+    // published robots come with their fitness only.
     let is_known =
         run.follows_protocol() && training.images == run.training_images && *path != published::archive();
     let subject = |robot: &Robot| Subject {
@@ -209,8 +208,8 @@ fn open(options: &Options, session: &Session) -> Result<Opened, Error> {
     Ok(Opened { config, fitness, training, subjects, order, file })
 }
 
-/// The images a run's robots were evolved on, of each class the first few. Of other data, verdicts
-/// would mean nothing.
+/// Returns the first images per class that a run's robots were evolved on. With other data,
+/// verdicts would mean nothing.
 fn training_of(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Training, Error> {
     let dataset = load_dataset_of(Some(&run.dataset), &run.config, whereabouts, &[Split::Train])?;
     let mut taken = [0; 256];
@@ -225,7 +224,7 @@ fn training_of(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<
         seen.map_err(|error| error.in_place("training_images").in_place(&path.display().to_string()))
     };
     let (dataset, stimuli) = (run.dataset.clone(), images.iter().map(see).collect::<Result<Vec<_>, Error>>());
-    // As in a test, every rollout has the same conditions, however the robot was trained.
+    // As in a test, all rollouts have the same conditions, however the robot was trained.
     let conditions = Vec::new();
     Ok(Training { dataset, images, stimuli: stimuli?, conditions })
 }
@@ -235,7 +234,7 @@ impl Trial {
         Perturbation::all(&self.criteria.perturbations, &subject.body, self.config.protocol.rollout)
     }
 
-    /// One robot's audit; `None` if stopped before its end.
+    /// Audits one robot; returns `None` if stopped.
     fn robot(&self, subject: &Subject, session: &Session, done: &AtomicU64) -> Option<RobotAudit> {
         let count = |rollouts: usize| {
             session.observer.progress(done.fetch_add(rollouts as u64, Ordering::Relaxed) + rollouts as u64);
@@ -256,7 +255,7 @@ impl Trial {
         let classes: Vec<u8> = self.training.images.iter().map(|image| image.label).collect();
         let still = vec![0.0; classes.len()];
         let split = self.grouping.tasks().iter().find(|split| split.is_called(&subject.task));
-        // A run's robots are checked to have tasks of the run.
+        // Robots of a run were checked to have one of its tasks.
         let split = split.unwrap_or(&self.grouping.tasks()[0]);
         let behaviour = Behaviour::new(
             &self.criteria,
@@ -303,7 +302,7 @@ impl Trial {
     }
 }
 
-/// Displacements in a setting; `None` if a rollout is unstable.
+/// Returns the displacements in a setting, or `None` if a rollout is unstable.
 fn displacements_in(setting: &Setting, session: &Session) -> Result<Option<Vec<f64>>, Stopped> {
     let Setting { body, physics, protocol, stimuli } = setting;
     if protocol.rollout == RolloutMode::Fresh {
@@ -327,8 +326,7 @@ mod tests {
     use crate::task::protocol::{Protocol, RolloutMode};
     use std::sync::atomic::AtomicBool;
 
-    /// Two images, of classes 0 and 1, the first dark and the second bright, each in a fresh
-    /// rollout of five cycles.
+    /// Two images, of classes 0 (dark) and 1 (bright), each in a fresh rollout of five cycles.
     fn trial(height: usize, width: usize, physics: Physics) -> Trial {
         let set = ["task={splits=[0,1],same_way_bin=true}", "protocol.control_steps=250"].map(str::to_string);
         let mut config = Config::parse(BUILT_IN[0].1, BUILT_IN[0].0, &set).unwrap();
@@ -352,8 +350,7 @@ mod tests {
         trial.robot(&subject, &Session::default(), &AtomicU64::new(0)).unwrap()
     }
 
-    /// Muscles of one phase above, of the other below, a soft front and a rigid foot: it walks to
-    /// the right.
+    /// Muscles of opposite phases above and below, a soft front and a rigid foot: it walks right.
     const WALKER: &str = "444422/444422/333311/330011";
 
     #[test]
@@ -373,7 +370,7 @@ mod tests {
         assert_eq!((found.persisting, found.rollouts.len()), (1.0, 14));
         assert!(found.displacements.unwrap().iter().all(|d| *d > 5.0));
         assert!(found.spread < 1.0 && found.energy_per_cycle.drive > 0.0);
-        // It sees nothing, so that it cannot tell classes apart.
+        // It sees nothing, so it cannot tell classes apart.
         assert_eq!(audited(WALKER, "0|1", Physics::default()).verdict, Verdict::NotAWalker);
     }
 
@@ -389,7 +386,7 @@ mod tests {
 
     #[test]
     fn images_that_are_the_same_to_the_sensors_are_one_rollout_with_the_same_end() {
-        // Its one sensor sees the top right pixel; the images differ elsewhere, too.
+        // Its one sensor sees the top right pixel; the images differ elsewhere too.
         let body: Body = "444425/444422/333311/330011".parse().unwrap();
         let image = |sensed: f64, other: f64| {
             Grid::from_fn(4, 6, |r, c| if (r, c) == (0, 5) { sensed } else { other })
@@ -429,7 +426,7 @@ mod tests {
         file("a", &["y", "z"]).write(&path).unwrap();
         ours.add_known(&path);
         assert_eq!(ids(&ours), ["x", "y", "z"]);
-        // Of another state of the run.
+        // From another state of the run.
         let mut other = file("b", &["x"]);
         other.add_known(&path);
         assert_eq!(ids(&other), ["x"]);

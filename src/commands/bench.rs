@@ -7,28 +7,28 @@ use crate::sim::{InstructionSet, Physics, Start, System, World};
 use serde::Serialize;
 use std::time::Duration;
 
-/// A body to measure with.
+/// A body to measure.
 #[derive(Clone, Debug)]
 pub struct Specimen {
-    /// What it stands for.
+    /// Name of the kind of body.
     pub name: &'static str,
     /// The body.
     pub body: Body,
 }
 
-/// How fast one body is simulated, on one core.
+/// Simulation speed of one body, on one core.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Speed {
-    /// What the body stands for.
+    /// Name of the specimen.
     pub body: &'static str,
-    /// Its voxels.
+    /// Number of its voxels.
     pub voxels: usize,
     /// Instruction set.
     pub instruction_set: &'static str,
-    /// What measured it: "processor", the processor time of the thread, which what else the machine
-    /// does leaves as it is; or "wall", where the system does not tell that.
+    /// Clock: "processor" is the processor time of the thread, which other load does not change;
+    /// "wall" where the system has no such clock.
     pub clock: &'static str,
-    /// Microseconds per substep, median of the repetitions.
+    /// Microseconds per substep, the median of the repetitions.
     pub microseconds: f64,
     /// Control steps per second.
     pub control_steps: f64,
@@ -37,8 +37,8 @@ pub struct Speed {
 /// Material by row and column.
 type Pattern = dyn Fn(usize, usize) -> Material;
 
-/// Bodies of every kind that differ in cost. Their voxels are a fixed pattern, so that figures of
-/// different machines and versions can be compared.
+/// Returns bodies of every kind that differs in cost. Their voxels form a fixed pattern, so that
+/// figures compare across machines and versions.
 pub fn specimens() -> Vec<Specimen> {
     use Material::{Empty, MuscleAntiphase, MuscleInPhase, Rigid, SensorExpand, SensorShrink, Soft};
     let active = |r: usize, c: usize| match (r / 2 + c / 3) % 4 {
@@ -56,7 +56,7 @@ pub fn specimens() -> Vec<Specimen> {
         ),
         ("small, soft and active", Box::new(move |r, c| if r >= 9 && c < 8 { soft(r, c) } else { Empty })),
         ("full, mostly rigid", Box::new(move |r, c| if (r + 2 * c) % 3 < 2 { Rigid } else { soft(r, c) })),
-        // Gaps in diagonal pairs: at each the other two voxels touch at a corner only.
+        // Gaps in diagonal pairs: at each, the other two voxels touch at a corner only.
         (
             "corner contacts",
             Box::new(move |r, c| if matches!((r % 4, c % 4), (1, 2) | (2, 1)) { Empty } else { soft(r, c) }),
@@ -68,13 +68,13 @@ pub fn specimens() -> Vec<Specimen> {
     kinds.into_iter().filter_map(specimen).collect()
 }
 
-/// Control steps of one repetition: one actuation cycle.
+/// Control steps per repetition: one actuation cycle.
 const STEPS: u32 = 50;
-/// Control steps before measuring: the robot has landed and walks.
+/// Control steps before measuring, after which the robot has landed and walks.
 const WARM_UP: u32 = 50;
 
-/// Measures one body on one instruction set: the median of up to `repetitions` repetitions of fifty
-/// control steps of one rollout, fewer if they take longer than two seconds.
+/// Measures a body on an instruction set. Repeats fifty control steps of one rollout up to
+/// `repetitions` times, for about two seconds at most, and takes the median.
 pub fn measure(specimen: &Specimen, set: InstructionSet, repetitions: usize) -> Speed {
     let physics = Physics::default();
     let start = Start { column: 493, row: physics.ground_row };
@@ -110,12 +110,12 @@ pub fn measure(specimen: &Specimen, set: InstructionSet, repetitions: usize) -> 
     }
 }
 
-/// Repetitions in a table: about half a second per body on a fast machine.
+/// Repetitions per body in a table, about half a second on a fast machine.
 const REPETITIONS: usize = 101;
-/// A slow machine or instruction set does fewer.
+/// Time limit per body: a slow machine or instruction set does fewer repetitions.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// All specimens on some instruction sets, one after the other.
+/// Measures all specimens on some instruction sets, one after the other.
 pub fn table(sets: &[InstructionSet]) -> Vec<Speed> {
     let measured =
         |set: &InstructionSet| specimens().iter().map(|s| measure(s, *set, REPETITIONS)).collect::<Vec<_>>();
@@ -135,8 +135,7 @@ mod tests {
         let rigid = list[3].body.voxels().cells().iter().filter(|m| **m == Material::Rigid).count();
         assert_eq!(rigid, 131);
         let points = |i: usize| System::new(&list[i].body, Physics::default()).point_count();
-        // 24 gaps, none of which takes a whole vertex away; at each of 12 corner contacts one point
-        // more.
+        // 24 gaps, none of which removes a whole vertex; each of 12 corner contacts adds a point.
         assert!(points(4) > points(0), "{} {}", points(4), points(0));
     }
 

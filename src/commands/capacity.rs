@@ -1,5 +1,5 @@
-//! `morphcog capacity`: the networks that the robots are worth (paper, "Morphological cognition
-//! capacity").
+//! `morphcog capacity`: finds networks as accurate as robots ("Morphological cognition capacity" of
+//! the paper).
 
 pub(crate) mod images;
 
@@ -29,36 +29,35 @@ use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Endings of the figure beside the results.
+/// File endings of the figure beside the results.
 pub const FIGURES: [&str; 2] = ["svg", "png"];
 
-/// What to compare with what.
+/// Options of the comparison with networks.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The eval.json.
     pub eval: PathBuf,
-    /// What is trained.
+    /// Settings of the networks and their training.
     pub config: CapacityConfig,
-    /// Whether only robots count that an audit found physical.
+    /// True if only robots count that an audit found physical.
     pub physical_only: bool,
-    /// Where the results go (capacity.json; others beside it).
+    /// Path of the results (capacity.json; other files go beside it).
     pub out: PathBuf,
 }
 
-/// How it ended.
+/// Result of the comparison.
 #[derive(Clone, Debug)]
 pub struct Finished {
     /// The content of capacity.json.
     pub file: CapacityFile,
-    /// Why that, or what was trained, is not, or not as a whole, in its file, if so.
+    /// The error if results or trainings could not be written, or only in part.
     pub unwritten: Option<Error>,
 }
 
-/// Finds the capacity of evaluated robots. What was trained before is kept beside the results and
-/// not trained again.
+/// Finds the capacity of evaluated robots. Trainings are kept beside the results and reused.
 ///
 /// # Errors
-/// What is wrong with the evaluation, the data or the settings.
+/// Returns an error if the evaluation, data or settings are wrong.
 pub fn capacity(options: &Options, session: &Session) -> Result<Finished, Error> {
     let report = EvalFile::read(&options.eval)?;
     let setting = comparable(&report, options, session)?;
@@ -119,14 +118,14 @@ pub fn capacity(options: &Options, session: &Session) -> Result<Finished, Error>
         });
         unwritten.tried(write(options, &file), session)?;
     }
-    // What was found before it was stopped is better than nothing.
+    // Results up to the stop are better than none.
     if file.stopped && !file.tasks.is_empty() {
         unwritten.tried(write(options, &file), session)?;
     }
     Ok(Finished { file, unwritten: unwritten.error().or(networks.unkept.error()) })
 }
 
-/// What the robots of an evaluation saw and did, if networks can be trained for the same.
+/// Returns the setting of an evaluation, or an error if no networks can be compared with it.
 fn comparable<'a>(report: &'a EvalFile, options: &Options, session: &Session) -> Result<&'a Setting, Error> {
     let name = options.eval.display();
     let Some(setting) = &report.setting else {
@@ -166,7 +165,7 @@ fn comparable<'a>(report: &'a EvalFile, options: &Options, session: &Session) ->
     Ok(setting)
 }
 
-/// Whether the kernels of the networks leave something of the images to pool.
+/// Refuses kernels that leave nothing of the images to pool.
 fn kernel_fits(config: &CapacityConfig, setting: &Setting) -> Result<(), Error> {
     let side = setting.body.height.min(setting.body.width);
     let (kernel, pooling) = (config.cnn.kernel, config.cnn.pooling);
@@ -178,24 +177,24 @@ fn kernel_fits(config: &CapacityConfig, setting: &Setting) -> Result<(), Error> 
     Ok(())
 }
 
-/// Of all that the trainings of a kind of networks depend on; `images` names those they see.
+/// Hashes all that the trainings of a kind of network depend on; `images` names their images.
 fn key(split: &grouping::Split, kind: Kind, config: &CapacityConfig, images: &str) -> String {
     let groups = [Group::A, Group::B].map(|group| split.classes(group));
-    // Other arithmetic gives other trainings, so those of networks in f32 are not taken for these.
+    // Other arithmetic gives other trainings, so those of networks in f32 must not match.
     let by = concat!(env!("CARGO_PKG_VERSION"), " in f64");
     let all = (by, groups, kind.name(), config.of(kind), images, config.seed);
     sha256_hex(serde_json::to_string(&all).expect("JSON has all of it").as_bytes())
 }
 
-/// The networks that robots are compared with.
+/// The networks to compare with robots.
 struct Networks<'a> {
     config: &'a CapacityConfig,
     images: &'a Images,
-    /// What was trained so far.
+    /// Trainings so far.
     known: Trainings,
-    /// How keeping it went.
+    /// Outcome of writing them.
     unkept: Unwritten,
-    /// Trainings that are done.
+    /// Number of trainings done.
     done: AtomicU64,
     pool: &'a rayon::ThreadPool,
     session: &'a Session<'a>,
@@ -206,7 +205,7 @@ impl Networks<'_> {
         key(split, kind, self.config, &self.images.key)
     }
 
-    /// Says how many there are to train, and how many are known.
+    /// Reports how many networks there are to train, and how many are known.
     fn begin(&self, splits: &[&grouping::Split]) {
         let Networks { config, known, .. } = self;
         let of_one = |(split, kind): (&grouping::Split, Kind)| -> usize {
@@ -223,7 +222,7 @@ impl Networks<'_> {
         self.done.store(before, Ordering::Relaxed);
     }
 
-    /// The curves of a task, whose robots have this accuracy; `None` if it was stopped.
+    /// Returns the curves of a task whose robots have this accuracy, or `None` if stopped.
     fn curves(&mut self, split: &grouping::Split, accuracy: f64) -> Result<Option<Vec<Curve>>, Error> {
         let config = self.config;
         let mut curves = Vec::new();
@@ -242,7 +241,7 @@ impl Networks<'_> {
         Ok(Some(curves))
     }
 
-    /// Trains the networks of a size that are not known yet, and keeps them; whether it was not
+    /// Trains the networks of a size that are not known yet, and stores them. Returns false if
     /// stopped.
     fn train(&mut self, samples: &Task, key: &str, size: usize) -> Result<bool, Error> {
         let Networks { config, session, done, pool, .. } = &*self;
@@ -253,7 +252,7 @@ impl Networks<'_> {
             Ok(trained)
         };
         let trained: Vec<Result<Trained, Error>> = pool.install(|| open.into_par_iter().map(train).collect());
-        // Trainings are kept in their order: those before the first that was stopped.
+        // Trainings are kept in order: those before the first that was stopped.
         let (mut finished, mut goes_on) = (Vec::new(), true);
         for trained in trained {
             match trained {
@@ -286,7 +285,7 @@ fn curve_of(kind: Kind, points: Vec<Point>, accuracy: f64) -> Curve {
     let within = means.first().zip(means.last()).map(|(first, last)| (first.0, last.0));
     let capacity = match fit.zip(within) {
         Some((fit, within)) => curve::first_crossing(fit, accuracy, within),
-        // Of fewer than three sizes there is no parabola.
+        // Fewer than three sizes have no parabola.
         None => curve::first_of(&means, accuracy),
     };
     Curve { network: kind.name().to_string(), points, fit, capacity }
@@ -297,7 +296,7 @@ fn write(options: &Options, file: &CapacityFile) -> Result<(), Error> {
     write_with_table(&options.out, &file.to_json(), &file.to_csv(), figures)
 }
 
-/// The robots that count.
+/// Returns the robots that count, all or the physical ones.
 fn robots<'a>(report: &'a EvalFile, options: &Options) -> Result<Vec<&'a RobotReport>, Error> {
     let name = options.eval.display();
     if report.robots.is_empty() {
@@ -350,7 +349,7 @@ mod tests {
         let other_seed = CapacityConfig { seed: config.seed + 1, ..config.clone() };
         let keys = [
             of([&[1], &[26]], Kind::Mlp, &config, "a"),
-            // Classes of two digits are no classes of one.
+            // A class of two digits is not two classes of one digit.
             of([&[1], &[2, 6]], Kind::Mlp, &config, "a"),
             of([&[1], &[26]], Kind::Cnn, &config, "a"),
             of([&[1], &[26]], Kind::Mlp, &config, "b"),

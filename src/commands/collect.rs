@@ -1,4 +1,4 @@
-//! What the tasks of a sweep found, in one table.
+//! Collects the results of a sweep's tasks in one table.
 
 use crate::analysis::progress::Progress;
 use crate::analysis::sweep::{Collected, Row, RunRow, Tested};
@@ -21,7 +21,7 @@ use std::path::PathBuf;
 /// tests that cannot be read, or are of another state of their run: these are left out.
 ///
 /// # Errors
-/// If a run is broken.
+/// Returns an error if a run is broken.
 pub fn collect(
     tasks: &[Task],
     status: &[Status],
@@ -29,7 +29,7 @@ pub fn collect(
     warn: &dyn Fn(&str),
 ) -> Result<Collected, Error> {
     let mut all = Collected { rows: Vec::new(), progress: Vec::new(), archives: Vec::new() };
-    // The first of those tests that were made without the plan.
+    // Settings of the first test that no plan requested.
     let mut without_plan = None;
     for (task, status) in tasks.iter().zip(status) {
         let folder = place.out.join(&task.name);
@@ -62,7 +62,7 @@ pub fn collect(
                 warn(&format!("{}: another test than of {first}: {key} = {there}, not {other}", task.name));
             }
         }
-        // As the run's own files call them.
+        // Named as in the run's own files.
         let grouping = run.config.grouping()?;
         let tasks = grouping.tasks().iter().zip(&run.dimensions.tasks);
         for (_, recognises) in tasks.filter(|(split, _)| !split.is_same_way()) {
@@ -76,7 +76,6 @@ pub fn collect(
     Ok(all)
 }
 
-/// What lies beside a run.
 struct Found {
     validated: Vec<crate::store::validation::Validated>,
     audit: Option<AuditFile>,
@@ -84,7 +83,7 @@ struct Found {
 }
 
 impl Found {
-    /// What the plan asks for, or what was found without it; nothing by other settings than the plan's.
+    /// Reads the results that match the plan; without a plan for tests, any test.
     fn of(task: &Task, source: &StoredRun, place: &Place, warn: &dyn Fn(&str)) -> Result<Self, Error> {
         let run = &source.run;
         let left_out = |text: &str| warn(&format!("{text}; left out"));
@@ -108,7 +107,7 @@ impl Found {
                 }
             },
             Some(_) => None,
-            // Tests may have been made without the plan.
+            // Tests may exist that the plan does not request.
             None => {
                 let splits = [HeldOut::Test, HeldOut::Validation];
                 let tests = splits.map(|split| source.path.with_file_name(own_name(split)));
@@ -153,7 +152,7 @@ impl Found {
     }
 }
 
-/// Whether a test is the plan's; `left_out` is told in what it is another.
+/// Returns true if the plan requests this test; if not, `left_out` gets the reason.
 fn is_planned_test(
     found: &EvalFile,
     source: &StoredRun,

@@ -1,4 +1,4 @@
-//! `morphcog data`: fetching and describing datasets.
+//! `morphcog data`: fetches and describes datasets.
 
 use crate::data::catalogue::{Catalogue, known_as};
 use crate::data::dataset::{Dataset, DatasetError, Split};
@@ -6,24 +6,23 @@ use crate::data::files::Place;
 use crate::data::info::DatasetInfo;
 use std::collections::BTreeMap;
 
-/// What there is of a dataset (`morphcog data info`).
+/// Description of a dataset (`morphcog data info`).
 #[derive(Debug)]
 pub struct Found {
-    /// Name, folder and the splits that can be used.
+    /// Name, folder and usable splits.
     pub info: DatasetInfo,
-    /// Names of those of its files that are exactly the published ones.
+    /// Names of its files that are identical to the published ones.
     pub published: Vec<String>,
-    /// Splits that are those of a dataset known by another name, and that name.
+    /// Splits that belong to a dataset known by another name, with that name.
     pub others: BTreeMap<Split, &'static str>,
-    /// Why other splits cannot be used.
+    /// Unusable splits, each with the reason.
     pub problems: Vec<(Split, DatasetError)>,
 }
 
-/// Looks at both splits of a dataset, each on its own: one may be there without the other.
-/// `transpose` is as of [`Dataset::oriented`].
+/// Inspects each split by itself, since one may be missing. `transpose`: see [`Dataset::oriented`].
 ///
 /// # Errors
-/// Why the training images cannot be loaded, if the test images cannot be either.
+/// Returns the error of the training images if neither split can be loaded.
 pub fn info(name: &str, given: &[Place], transpose: Option<bool>) -> Result<Found, DatasetError> {
     let mut info: Option<DatasetInfo> = None;
     let mut problems = Vec::new();

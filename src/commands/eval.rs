@@ -1,4 +1,4 @@
-//! `morphcog eval`: how well robots do on held-out images (paper, "Generalization test").
+//! `morphcog eval`: tests robots on held-out images (paper, "Generalization test").
 
 pub(crate) mod images;
 
@@ -32,46 +32,45 @@ use crate::task::protocol::MAX_STEPS;
 use crate::task::stimulus::StimulusParams;
 use std::path::PathBuf;
 
-/// What to evaluate, and on what.
+/// Options of an evaluation.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// The run.json, or those of several runs that differ in their seeds and windows only; none: the
-    /// published robots.
+    /// The run.json files, which may differ in seeds and windows only; none: the published robots.
     pub archives: Vec<PathBuf>,
-    /// Which of its robots.
+    /// The robots to evaluate.
     pub robots: Selection,
-    /// How many images.
+    /// Number of images.
     pub images: HowMany,
-    /// Which images.
+    /// Split of the images.
     pub split: HeldOut,
-    /// Validation images in all, for a selection by them; `None`: as the config says.
+    /// Number of validation images to choose robots by; `None`: as the config says.
     pub validation: Option<usize>,
-    /// Seed of what is drawn: images, and robots with `random:N`.
+    /// Seed for drawing images, and robots with `random:N`.
     pub seed: u64,
     /// Displacements up to this count as wrong \[voxel lengths\].
     pub threshold: f64,
     /// Actuation cycles per image.
     pub cycles: u32,
-    /// Another dataset than the runs', whose test images are shown.
+    /// Another dataset than the runs' to take test images from.
     pub dataset: Option<String>,
-    /// Where the results go (eval.json; eval.csv beside it).
+    /// Path of the results (eval.json; eval.csv goes beside it).
     pub out: PathBuf,
 }
 
-/// An evaluation's end.
+/// Result of an evaluation.
 #[derive(Clone, Debug)]
 pub struct Finished {
     /// The content of eval.json.
     pub file: EvalFile,
-    /// Why that is not, or not as a whole, in its file, if so.
+    /// The error if the results could not be written, or only in part.
     pub unwritten: Option<Error>,
 }
 
-/// Evaluates robots; results are written after every robot, so that stopping keeps what is
-/// finished. Those of another test in the file stay, under another name.
+/// Evaluates robots and writes the results after each one, so that stopping keeps them. Results of
+/// another test in the file stay, under another name.
 ///
 /// # Errors
-/// What is wrong with archive, data or selection.
+/// Returns an error if the archive, data or selection is wrong.
 pub fn eval(options: &Options, session: &Session) -> Result<Finished, Error> {
     let opened = Opened::new(options, session)?;
     let Opened { sources, config, grouping, wanted, dataset, steps, .. } = &opened;
@@ -92,8 +91,7 @@ pub fn eval(options: &Options, session: &Session) -> Result<Finished, Error> {
     let (robots, scores): (Vec<Chosen>, Vec<Validated>) = match wanted {
         None => (robots, Vec::new()),
         Some(wanted) => {
-            // Which images are for validation is known by their indices, in the run's own data
-            // only.
+            // Indices identify validation images, and only in the run's own data.
             let others = opened.other.map(|_| opened.own(&[Split::Train])).transpose()?;
             let of_runs = others.as_ref().unwrap_or(dataset);
             let best =
@@ -119,11 +117,8 @@ pub fn eval(options: &Options, session: &Session) -> Result<Finished, Error> {
     Ok(Finished { file: report, unwritten: unwritten.error() })
 }
 
-/// The results in their file, if they are those of this very test: the same version of the program,
-/// runs, robots and images, shown in the same way and judged by the same threshold.
-///
-/// # Errors
-/// As of [`eval`].
+/// Returns the results in the file if they are of this very test: same program version, runs,
+/// robots, images, conditions and threshold. Fails as [`eval`] does.
 pub(crate) fn known(options: &Options, session: &Session) -> Result<Option<EvalFile>, Error> {
     let Ok(known) = EvalFile::read(&options.out) else { return Ok(None) };
     let opened = Opened::new(options, session)?;
@@ -134,7 +129,7 @@ pub(crate) fn known(options: &Options, session: &Session) -> Result<Option<EvalF
     Ok(is_it.then_some(known))
 }
 
-/// How robots were chosen and shown images: keys with their values.
+/// Returns the settings of a test: keys with their values.
 pub(crate) fn settings(file: &EvalFile) -> [(&'static str, String); 8] {
     [
         ("robots", file.selected.clone()),
@@ -148,9 +143,8 @@ pub(crate) fn settings(file: &EvalFile) -> [(&'static str, String); 8] {
     ]
 }
 
-/// In what an evaluation is another than the one asked for, as far as that can be told without
-/// images: the key, its value there, and what is asked for. `cycle_steps` are the control steps of
-/// an actuation cycle.
+/// Returns the keys in which an evaluation differs from the options, with its value and theirs, as
+/// far as known without images. `cycle_steps` are the control steps per actuation cycle.
 pub(crate) fn differing(
     known: &EvalFile,
     options: &Options,
@@ -177,11 +171,8 @@ pub(crate) fn differing(
         .collect()
 }
 
-/// Whether an evaluation is of the robots that would be chosen from its runs now: verdicts may be
-/// others than they were.
-///
-/// # Errors
-/// If robots cannot be chosen.
+/// Returns true if its runs would yield the robots of an evaluation again, with the present
+/// verdicts. Fails if robots cannot be chosen.
 pub(crate) fn is_of_robots(
     known: &EvalFile,
     sources: &[StoredRun],
@@ -189,7 +180,7 @@ pub(crate) fn is_of_robots(
 ) -> Result<bool, Error> {
     let of_run = |run: usize| known.robots.iter().filter(move |robot| robot.run == run);
     if options.robots.validated().is_some() {
-        // Validation images choose the same robots again, of those that are physical now.
+        // Validation images would choose the same robots again, if these are still physical.
         let wanted = |config: &Config| options.validation.unwrap_or(config.validation.images);
         for (number, source) in sources.iter().enumerate() {
             let images = wanted(&source.run.config);
@@ -216,10 +207,9 @@ pub(crate) fn is_of_robots(
     Ok(chosen.eq(known.robots.iter().map(|robot| (robot.run, &robot.id))))
 }
 
-/// How the robots of some runs see images together, and all their tasks.
+/// Returns the config under which robots of several runs see images together, and all their tasks.
 fn together(sources: &[StoredRun]) -> Result<(Config, Grouping), Error> {
-    // Several trainings may have found different windows: what takes no body is on what they see
-    // together.
+    // Trainings may have found different windows; the baselines use what all see together.
     let configs = || sources.iter().map(|source| &source.run.config);
     let config = Config::together(configs()).expect("there is a run");
     let task = TaskConfig::together(configs().map(|config| &config.task));
@@ -228,18 +218,18 @@ fn together(sources: &[StoredRun]) -> Result<(Config, Grouping), Error> {
     Ok((config, grouping))
 }
 
-/// What a test is about, but for its robots and images.
+/// A test without its robots and images.
 struct Opened<'o> {
     sources: Vec<StoredRun>,
-    /// With what all robots see together.
+    /// The config under which all robots see images together.
     config: Config,
     grouping: Grouping,
-    /// How robots are chosen by validation images, if they are.
+    /// Selection by validation images, if requested.
     wanted: Option<validation::Wanted>,
     whereabouts: Whereabouts,
-    /// Another dataset than the runs', if one is asked for.
+    /// Another dataset than the runs', if requested.
     other: Option<&'o str>,
-    /// That, or the runs' own.
+    /// That dataset, or the runs' own.
     dataset: Dataset,
     /// Control steps per image.
     steps: u32,
@@ -273,12 +263,11 @@ impl<'o> Opened<'o> {
         Ok(Opened { sources, config, grouping, wanted, whereabouts, other, dataset, steps })
     }
 
-    /// The runs' own data.
     fn own(&self, splits: &[Split]) -> Result<Dataset, Error> {
         own(&self.sources[0], &self.config, &self.whereabouts, splits)
     }
 
-    /// What is known of the test before its first robot.
+    /// Returns the report as it is before the first robot.
     fn report(&self, options: &Options, shown: &HeldOutImages) -> EvalFile {
         let Opened { sources, config, other, dataset, steps, .. } = self;
         let asked = (options.robots.describe(), options.split, options.seed, options.threshold);
@@ -291,7 +280,7 @@ impl<'o> Opened<'o> {
     }
 }
 
-/// The data of a run, and of those that are tested with it.
+/// Loads the data that the runs of a test share.
 fn own(
     run: &StoredRun,
     config: &Config,
@@ -304,7 +293,7 @@ fn own(
     })
 }
 
-/// What all robots are tested with.
+/// The parts of a test that all robots share.
 struct Testing<'a> {
     session: &'a Session<'a>,
     options: &'a Options,
@@ -314,8 +303,8 @@ struct Testing<'a> {
 }
 
 impl Testing<'_> {
-    /// Tests robots, one for each process at a time, and writes the report after each; `scores` are
-    /// theirs on validation images, if they were chosen by these. How writing went.
+    /// Tests robots, one per process at a time, and writes the report after each round. `scores`
+    /// are theirs on validation images, if these chose them. Returns the outcome of writing.
     fn test(
         &self,
         robots: &[Chosen],
@@ -366,7 +355,7 @@ impl Testing<'_> {
     }
 }
 
-/// The runs, if they can be tested together and their results written.
+/// Reads the runs; checks that they can be tested together and the results written.
 fn sources(options: &Options) -> Result<Vec<StoredRun>, Error> {
     let sources: Vec<StoredRun> =
         options.archives.iter().map(|path| robots::open(path)).collect::<Result<_, _>>()?;
@@ -380,7 +369,7 @@ fn sources(options: &Options) -> Result<Vec<StoredRun>, Error> {
     Ok(sources)
 }
 
-/// How robots are to be chosen by validation images, if they are; the same threshold counts there.
+/// Returns how to choose robots by validation images, if requested; the same threshold applies.
 fn wanted(options: &Options, config: &Config) -> Result<Option<validation::Wanted>, Error> {
     let Some(count) = options.robots.validated() else {
         return match options.validation {
@@ -399,7 +388,7 @@ fn wanted(options: &Options, config: &Config) -> Result<Option<validation::Wante
     Ok(Some(validation::Wanted { count, images, argument, threshold: options.threshold }))
 }
 
-/// The robots that have a task; others are left out with a warning.
+/// Returns the robots that have a task, and warns about the others.
 fn skilled<'a>(
     robots: Vec<Chosen<'a>>,
     grouping: &Grouping,
@@ -419,7 +408,7 @@ fn skilled<'a>(
     Ok(robots)
 }
 
-/// The default name of the results beside a run.json.
+/// Returns the default file name of the results beside a run.json.
 pub fn own_name(split: HeldOut) -> &'static str {
     match split {
         HeldOut::Test => EVAL_JSON,
@@ -427,8 +416,8 @@ pub fn own_name(split: HeldOut) -> &'static str {
     }
 }
 
-/// Whether robots of two runs can be tested together: what they are shown, and where they live, is
-/// the same. They may look at different windows of it, and tell the same classes apart in other ways.
+/// Checks that robots of two runs can be tested together, on the same images in the same world.
+/// Their windows and their groups of the classes may differ.
 fn same_setting(first: &StoredRun, other: &StoredRun) -> Result<(), Error> {
     let (a, b) = (&first.run.config, &other.run.config);
     let of_data = |config: &Config| (config.data.dataset.clone(), config.data.builtin.clone());
@@ -451,7 +440,7 @@ fn same_setting(first: &StoredRun, other: &StoredRun) -> Result<(), Error> {
     }
 }
 
-/// Sets the results of another test aside, if they are in the file.
+/// Sets results of another test aside, if the file has any.
 fn make_room(options: &Options, report: &EvalFile, session: &Session) -> Result<(), Error> {
     let validated = |file: &EvalFile| file.robots.first()?.validation.as_ref().map(|of| of.images);
     let is_same = |known: EvalFile| known.head() == report.head() && validated(&known) == validated(report);
@@ -462,7 +451,7 @@ fn write(options: &Options, report: &EvalFile) -> Result<(), Error> {
     write_with_table(&options.out, &report.to_json(), &report.to_csv(), [])
 }
 
-/// The same, if a robot can be shown an image for so long.
+/// Returns the control steps of so many cycles, or an error if they exceed [`MAX_STEPS`].
 fn checked_steps(config: &Config, cycles: u32) -> Result<u32, Error> {
     let steps = control_steps(config, cycles);
     match steps <= MAX_STEPS {

@@ -1,5 +1,5 @@
-//! What the commands do, one file per command: options in, result out. They compose the modules
-//! below, report through an [`Observer`](crate::base::observer::Observer), and never print.
+//! The commands, one file each: options in, result out. They compose the modules below, report
+//! through an [`Observer`](crate::base::observer::Observer), and never print.
 
 pub mod audit;
 pub mod bench;

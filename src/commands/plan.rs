@@ -1,4 +1,4 @@
-//! [`Plan`]: what belongs to a reproduction of the paper.
+//! [`Plan`]: the experiments and settings of a reproduction of the paper.
 
 use crate::base::error::Error;
 use crate::base::files::read_given;
@@ -11,62 +11,62 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// The built-in plan: the paper's.
+/// The built-in plan, which is the paper's.
 pub const PAPER_TOML: (&str, &str) = ("paper.toml", include_str!("../../configs/paper.toml"));
 
-/// What belongs to a reproduction.
+/// Plan of a reproduction: its experiments, and how their robots are tested.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Plan {
-    /// Seeds of the runs of each experiment.
+    /// Seeds of each experiment's runs.
     pub seeds: Vec<u64>,
-    /// Robots of each task that are tested.
+    /// Number of robots tested per task.
     pub robots: usize,
-    /// Test images.
+    /// Number of test images.
     pub images: usize,
     /// The experiments.
     pub experiment: Vec<Experiment>,
-    /// How robots are judged.
+    /// Criteria of the audits.
     #[serde(default)]
     pub audit: Criteria,
-    /// The networks.
+    /// Networks to compare robots with.
     #[serde(default)]
     pub capacity: CapacityConfig,
-    /// The plan's folder, from which on configs are looked for.
+    /// Folder of the plan, to which paths of configs are relative.
     #[serde(skip)]
     pub folder: PathBuf,
 }
 
-/// An experiment: a config, and what is changed in it.
+/// An experiment: a config and changes to it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
-    /// A config file, from the plan's folder on, or the name of a built-in one.
+    /// A config file, relative to the plan's folder, or the name of a built-in one.
     pub config: String,
     /// Changes, as with `--set`.
     #[serde(default)]
     pub set: Vec<String>,
 }
 
-/// Least numbers of test images and trainings at small scales.
+/// Fewest test images and trainings at small scales.
 const LEAST: [usize; 2] = [100, 5];
 
 impl Plan {
-    /// Whether a name is that of the built-in plan, and of no file.
+    /// Returns true if a name means the built-in plan, and no file.
     pub fn is_built_in(name: &str) -> bool {
         let own = PAPER_TOML.0;
         (name == own || own.strip_suffix(".toml") == Some(name)) && !Path::new(name).exists()
     }
 
-    /// The plan as TOML, every key with its value.
+    /// Returns the plan as TOML, with the value of every key.
     pub fn to_toml(&self) -> String {
         toml::to_string_pretty(self).expect("every field is a number, text, list or table, which TOML has")
     }
 
-    /// Reads a plan: a file or, if there is none, the built-in one of that name.
+    /// Reads a plan from a file or, if there is none, the built-in one of that name.
     ///
     /// # Errors
-    /// What is wrong with it, with file, line and key.
+    /// Returns an error with file, line and key if the plan is wrong.
     pub fn load(name: &str, overrides: &[String]) -> Result<Self, Error> {
         let text = match read_given(Path::new(name)) {
             Err(_) if Plan::is_built_in(name) => PAPER_TOML.1.to_string(),
@@ -83,7 +83,6 @@ impl Plan {
         Ok(placed(&plan))
     }
 
-    /// Checks what a type cannot.
     fn check(&self) -> Result<(), Error> {
         let refuse = |key: &str, text: &str| Err(Error::input(text.to_string()).with_key(key));
         if self.seeds.is_empty() || self.experiment.is_empty() {
@@ -99,10 +98,10 @@ impl Plan {
         self.capacity.check().map_err(|error| error.with_key("capacity"))
     }
 
-    /// The experiments: what their runs are called, and their configs.
+    /// Returns the experiments: names of their runs, and configs.
     ///
     /// # Errors
-    /// What is wrong with one: a slip in the last one would be found out after hours.
+    /// Returns an error if any is wrong: a slip in the last one would otherwise show after hours.
     pub(crate) fn experiments(&self) -> Result<Vec<(String, Config)>, Error> {
         let mut experiments = Vec::<(String, Config)>::new();
         for (number, experiment) in (1..).zip(&self.experiment) {
@@ -132,8 +131,7 @@ impl Plan {
         Ok(experiments)
     }
 
-    /// The plan at a scale: generations are multiplied by it, test images and trainings by its
-    /// square root.
+    /// Scales the plan: generations by `scale`, test images and trainings by its square root.
     #[must_use]
     pub(crate) fn at(&self, scale: f64) -> Self {
         let part = |count: usize, least: usize| {
@@ -148,7 +146,7 @@ impl Plan {
     }
 }
 
-/// A config at a scale: its generations are multiplied by it.
+/// Returns a config with its generations multiplied by `scale`.
 pub(crate) fn scaled(config: &Config, scale: f64) -> Config {
     let generations = ((config.generations as f64 * scale).round() as u64).max(1);
     Config { generations, ..config.clone() }

@@ -1,4 +1,4 @@
-//! `morphcog replay`: record a robot's rollout, for the pictures.
+//! `morphcog replay`: records a robot's rollout for pictures.
 
 use crate::analysis::dossier::check_length;
 use crate::base::error::Error;
@@ -19,7 +19,7 @@ use crate::task::rollout::record;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// Most images in one recording: pictures hold every frame.
+/// Most images in one recording, since pictures hold every frame.
 pub const MAX_IMAGES: usize = 20;
 
 /// An image by split and index: `train:3`, `test:17`; without a word, a training image.
@@ -46,47 +46,47 @@ impl FromStr for Shown {
     }
 }
 
-/// What to record.
+/// Options of a recording.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// The robot: an id, the beginning of one, "best", or a name in the gallery.
+    /// The robot: an id or its beginning, "best", or a name in the gallery.
     pub robot: String,
-    /// Whether only robots will do that an audit found physical.
+    /// True if only robots count that an audit found physical.
     pub physical_only: bool,
     /// The run.json; `None`: the newest under `runs/`.
     pub archive: Option<PathBuf>,
     /// The images; none: the training images.
     pub images: Vec<Shown>,
-    /// Where the data are, if the command line says.
+    /// Folder of the data, if the command line names one.
     pub data: Option<PathBuf>,
     /// Another dataset than the run's.
     pub dataset: Option<String>,
 }
 
-/// A robot's rollout, and where it is from.
+/// A robot's rollout, and its description.
 #[derive(Clone, Debug)]
 pub struct Replay {
     /// The rollout.
     pub recording: Recording,
-    /// What a page says about it: words and values.
+    /// Description on a page: words and values.
     pub about: Vec<(String, String)>,
-    /// What the recording is called in file names.
+    /// Name of the recording in file names.
     pub name: String,
 }
 
-/// A robot and what it is shown, before it is simulated.
+/// A robot and its images, before the simulation.
 #[derive(Clone, Debug)]
 pub struct Subject {
     /// The robot.
     pub found: Found,
-    /// Images, as it sees them.
+    /// Images as it sees them.
     pub images: Vec<Seen>,
 }
 
-/// Records a robot's rollout as its config's protocol has it.
+/// Records a robot's rollout under the protocol of its config.
 ///
 /// # Errors
-/// What is wrong with robot, archive, images or data.
+/// Returns an error if the robot, archive, images or data are wrong.
 pub fn replay(options: &Options) -> Result<Replay, Error> {
     let subject = subject(options)?;
     let recording = record_subject(&subject);
@@ -104,7 +104,7 @@ pub fn replay(options: &Options) -> Result<Replay, Error> {
     Ok(Replay { recording, about, name })
 }
 
-/// Records a rollout.
+/// Records a subject's rollout.
 pub fn record_subject(subject: &Subject) -> Recording {
     let Subject { found: Found { name, body, config, judge, .. }, images } = subject;
     let fresh = config.protocol.rollout == RolloutMode::Fresh;
@@ -112,10 +112,10 @@ pub fn record_subject(subject: &Subject) -> Recording {
     Recording { judge: judge.clone(), ..recording }
 }
 
-/// Finds a robot and the images it is to be shown.
+/// Finds a robot and its images.
 ///
 /// # Errors
-/// What is wrong with robot, archive, images or data.
+/// Returns an error if the robot, archive, images or data are wrong.
 pub fn subject(options: &Options) -> Result<Subject, Error> {
     let mut found = find(options)?;
     let config = &mut found.config;
@@ -129,7 +129,7 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
         let all = match own {
             [] => {
                 let train = whereabouts.load(&config.data, &[Split::Train])?;
-                // No more than are shown: another dataset may have fewer.
+                // Draws no more than are recorded: another dataset may have fewer.
                 let is_shown = |per_class: &usize| per_class * config.classes().len() <= MAX_IMAGES;
                 let images_per_class = Some(config.data.images_per_class).filter(is_shown).unwrap_or(1);
                 let data = DataConfig { images_per_class, ..config.data.clone() };
@@ -173,29 +173,29 @@ fn some(images: &[ImageRef]) -> Vec<ImageRef> {
     some
 }
 
-/// A robot and how it is simulated.
+/// A robot, and the settings of its simulation.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// Its id.
     pub name: String,
     /// Its body.
     pub body: Body,
-    /// The config it was evolved with.
+    /// The config it evolved with.
     pub config: Config,
-    /// Its training images, as far as they are known.
+    /// Its training images, as far as known.
     pub training: Vec<ImageRef>,
-    /// What these are of.
+    /// Dataset of these images.
     pub dataset: Option<DatasetRef>,
-    /// What a page says about it: words and values.
+    /// Description on a page: words and values.
     pub about: Vec<(String, String)>,
-    /// What its walks say.
+    /// Rule that turns its walks into answers.
     judge: Option<Judge>,
-    /// The run.json it is from.
+    /// The run.json it comes from.
     pub archive: PathBuf,
 }
 
 impl Found {
-    /// Whose picture it is, in a line: robot, run and seed.
+    /// Returns the title of its picture, one line: robot, run and seed.
     pub fn title(&self) -> String {
         let word = |key: &str| self.about.iter().find(|(word, _)| word == key).map_or("", |(_, value)| value);
         format!("robot {}, {}", word("Robot"), word("From"))
@@ -205,7 +205,7 @@ impl Found {
 /// Finds a robot in an archive or the gallery.
 ///
 /// # Errors
-/// What is wrong with robot or archive.
+/// Returns an error if the robot or archive is wrong.
 pub fn find(options: &Options) -> Result<Found, Error> {
     let ids = Selection::Ids(vec![options.robot.clone()]);
     let (archives, _) = robots::archives(options.archive.iter().cloned().collect(), ids)?;
@@ -218,7 +218,7 @@ pub fn find(options: &Options) -> Result<Found, Error> {
         if options.archive.is_some() || options.physical_only {
             return error;
         }
-        // Without an archive, the robot may have been meant for a published one.
+        // Without an archive, the name may mean a published robot.
         error.remedy(Remedy::Run(Invocation::new("gallery"), "lists the published robots"))
     })?;
     let (robot, run) = (robots[0].robot, &source.run);

@@ -27,40 +27,40 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
-/// What to reproduce, and where to.
+/// Options of a reproduction.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The plan.
     pub plan: Plan,
-    /// Its scale, more than 0, up to 1.
+    /// Its scale, above 0 and up to 1.
     pub scale: f64,
-    /// Where, and with what.
+    /// Place of the results.
     pub place: Place,
     /// Runs at once; `None`: one per core.
     pub jobs: Option<usize>,
 }
 
-/// How a reproduction ended.
+/// Result of a reproduction.
 #[derive(Clone, Debug)]
 pub struct Finished {
-    /// How the runs ended; the table is made when all are done.
+    /// Summary of the runs; the table is made when all are done.
     pub runs: Summary,
-    /// The paper's table, so far.
+    /// The paper's table so far.
     pub rows: Vec<Row>,
     /// Files written at the end.
     pub files: Vec<PathBuf>,
-    /// Every experiment's networks, with their file.
+    /// Networks of every experiment, with their file.
     pub capacities: Vec<(PathBuf, CapacityFile)>,
-    /// Whether a signal stopped it.
+    /// True if a signal stopped it.
     pub stopped: bool,
-    /// Why the table is not, or not as a whole, in its files, if so.
+    /// The error if the table could not be written, or only in part.
     pub unwritten: Option<Error>,
 }
 
-/// The runs of a plan at a scale: every experiment from every seed.
+/// Returns the runs of a plan at a scale: every experiment from every seed.
 ///
 /// # Errors
-/// What is wrong with scale or plan.
+/// Returns an error if the scale or plan is wrong.
 pub fn tasks(plan: &Plan, scale: f64) -> Result<Vec<Task>, Error> {
     if !(scale > 0.0 && scale <= 1.0) {
         return Err(Error::argument("scale", scale, "expected more than 0, up to 1"));
@@ -82,11 +82,11 @@ pub fn tasks(plan: &Plan, scale: f64) -> Result<Vec<Task>, Error> {
     Ok(tasks)
 }
 
-/// Does what of a plan is not done yet: its runs, and then the last step, from their robots to the
-/// table. What was done by an earlier, interrupted call stays.
+/// Completes a plan: first its missing runs, then the steps from their robots to the table. Results
+/// of an earlier, interrupted call are kept.
 ///
 /// # Errors
-/// Of what is wrong.
+/// Returns an error if a check, or a step after the runs, fails.
 pub fn reproduce(options: &Options, session: &Session) -> Result<Finished, Error> {
     let tasks = tasks(&options.plan, options.scale)?;
     let place = &options.place;
@@ -126,13 +126,12 @@ pub fn reproduce(options: &Options, session: &Session) -> Result<Finished, Error
     Ok(finished)
 }
 
-/// Chosen robots, and by task how many are physical of how many that were audited.
+/// Chosen robots, and the numbers of physical and of audited ones by task.
 type Drawn<'s> = (Vec<Chosen<'s>>, BTreeMap<String, (usize, usize)>);
 
 /// Rows of the table, and networks with their file.
 type Experienced = (Vec<Row>, Option<(PathBuf, CapacityFile)>);
 
-/// One call.
 struct Job<'a> {
     place: &'a Place,
     plan: &'a Plan,
@@ -140,7 +139,7 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// All steps of an experiment; its rows of the table and its networks, or `None` if stopped.
+    /// Does all steps of an experiment. Returns its rows and networks, or `None` if stopped.
     fn experiment(&self, name: &str, config: &Config) -> Result<Option<Experienced>, Error> {
         let of_seed =
             |seed: &u64| StoredRun::read(&self.place.out.join(format!("{name}-seed{seed}")).join(RUN_JSON));
@@ -179,10 +178,10 @@ impl Job<'_> {
         Ok(Some((rows, Some((options.out, file)))))
     }
 
-    /// Robots of each task, drawn at random one after the other and audited, until enough are
-    /// physical or there are no more. If they are too few, the first of those take part, too, that
-    /// are not found to exploit the simulator: the paper, which sorted out by eye, kept such. With
-    /// them, counts by task. `None` if stopped.
+    /// Draws robots of each task at random and audits them, until enough are physical or none is
+    /// left. If too few are, the first others that do not exploit the simulator take part: the
+    /// paper, which sorted by eye, kept such. Returns them with counts by task, or `None` if
+    /// stopped.
     fn chosen<'s>(&self, sources: &'s [StoredRun]) -> Result<Option<Drawn<'s>>, Error> {
         let all = Selection::All.of(sources, 0)?;
         let grouping = sources[0].run.config.grouping()?;
@@ -220,7 +219,7 @@ impl Job<'_> {
         Ok(Some((chosen, counts)))
     }
 
-    /// The verdicts on some robots; `None` if stopped.
+    /// Returns the verdicts on some robots, or `None` if stopped.
     fn audited(
         &self,
         sources: &[StoredRun],
@@ -252,7 +251,7 @@ impl Job<'_> {
         Ok(Some(robots.iter().map(verdict).collect()))
     }
 
-    /// The test of the chosen robots; `None` if stopped.
+    /// Tests the chosen robots; returns `None` if stopped.
     fn tested(
         &self,
         name: &str,

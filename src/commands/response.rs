@@ -1,5 +1,5 @@
-//! `morphcog response`: how far each soft voxel and sensor moves a robot, and what it could be
-//! taught.
+//! `morphcog response`: measures how far each soft voxel and sensor moves a robot, and estimates
+//! the accuracy that training could reach.
 
 use crate::base::Grid;
 use crate::base::error::{Error, ErrorKind};
@@ -40,77 +40,73 @@ use crate::training;
 use crate::training::window::Windows;
 use std::path::PathBuf;
 
-/// Rollouts between two looks at how well the slopes are known, and least number of a robot's: ten
-/// under each of six conditions. Larger ones overshoot what is needed; smaller ones leave cores
-/// idle at their ends.
+/// Rollouts between two checks of the slopes' error, and fewest of a robot: ten under each of six
+/// conditions. Larger batches overshoot; smaller ones leave cores idle at their ends.
 pub const BATCH: usize = 60;
 
-/// Most training images of a class by which a task is known. More cost time, and hardly narrow the
-/// interval of what could be taught.
+/// Most training images per class of a task. More cost time, and hardly narrow the interval of the
+/// estimated accuracy.
 const IMAGES_PER_CLASS: usize = 1000;
 
-/// Least number of images of a class of a task: designs are solved with half of them, and judged by
-/// the other half.
+/// Fewest images per class of a task: half pose the design problems, half test the answers.
 const LEAST_PER_CLASS: usize = 4;
 
-/// What to measure, and how.
+/// Options of a measurement.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The run.json.
     pub archive: PathBuf,
-    /// Which of its robots, by name.
+    /// Names of the robots to measure.
     pub robots: Vec<String>,
-    /// Whether only robots will do that an audit found physical.
+    /// True if only robots count that an audit found physical.
     pub physical_only: bool,
-    /// Two groups of classes, to tell what robots could be taught.
+    /// Two groups of classes, to estimate the accuracy that training could reach.
     pub task: Option<Groups>,
-    /// Keys of the config that a training would have otherwise than the run, as
-    /// `stimulus.margin=5`; only with a task.
+    /// Config keys that a training would change, as `stimulus.margin=5`; only with a task.
     pub set: Vec<String>,
-    /// Most rollouts of a robot.
+    /// Most rollouts per robot.
     pub images: usize,
-    /// The relative error of the slopes at which a measurement ends.
+    /// Relative error of the slopes at which a measurement ends.
     pub error: f64,
-    /// Seed of the random images; `None`: that of the run, as `train` has it.
+    /// Seed of the random images; `None`: the run's, as in `train`.
     pub seed: Option<u64>,
-    /// Where the results go (response.json; CSV and pictures beside it).
+    /// Path of the results (response.json; CSV and pictures go beside it).
     pub out: PathBuf,
 }
 
-/// A measurement's end.
+/// Result of a measurement.
 #[derive(Clone, Debug)]
 pub struct Finished {
     /// The content of response.json.
     pub file: ResponseFile,
-    /// The pictures of its robots, to be made.
+    /// Pictures of its robots, still to be drawn.
     pub pictures: Vec<[PathBuf; 2]>,
-    /// Whether a signal stopped it before the last robot.
+    /// True if a signal stopped it before the last robot.
     pub stopped: bool,
-    /// Why what was found is not, or not as a whole, in its file, if so.
+    /// The error if the results could not be written, or only in part.
     pub unwritten: Option<Error>,
 }
 
-/// A robot to be measured.
+/// A robot to measure.
 struct Subject {
     id: String,
     gait: Gait,
 }
 
-/// Where robots are from.
+/// Robots, and the run they come from.
 struct Provenance {
     config: Config,
     run: String,
     sha256: String,
-    /// The data of the run.
     dataset: DatasetRef,
     robots: Vec<(String, Body)>,
 }
 
-/// Measures the responses of robots; results are written after every robot, so that stopping keeps
-/// what is finished. A robot that cannot be measured is left out with a warning if others can.
+/// Measures the responses of robots and writes the results after each one, so that stopping keeps
+/// them. Leaves out robots that cannot be measured, with a warning, if others can.
 ///
 /// # Errors
-/// What is wrong with archive, robots, data or options.
+/// Returns an error if the archive, robots, data or options are wrong.
 pub fn measure(options: &Options, session: &Session) -> Result<Finished, Error> {
     check_numbers(options)?;
     let provenance = provenance(options)?;
@@ -236,7 +232,7 @@ fn check_numbers(options: &Options) -> Result<(), Error> {
     Ok(())
 }
 
-/// Whether results and pictures can be written, and overwrite nothing of a run.
+/// Checks that results and pictures can be written, and overwrite nothing of a run.
 fn check_names(options: &Options, subjects: &[Subject]) -> Result<(), Error> {
     let out = &options.out;
     check_out(out, &options.archive, RESPONSE_JSON)?;
@@ -248,7 +244,7 @@ fn check_names(options: &Options, subjects: &[Subject]) -> Result<(), Error> {
     pictures(out, &ids).iter().flatten().try_for_each(|picture| writable(picture))
 }
 
-/// The robots that are asked for, each once.
+/// Returns the requested robots, each once, and their run.
 fn provenance(options: &Options) -> Result<Provenance, Error> {
     let path = &options.archive;
     let source = robots::open(path)?;
@@ -267,22 +263,22 @@ fn provenance(options: &Options) -> Result<Provenance, Error> {
     })
 }
 
-/// The conditions of `train`, as far as there are rollouts for them.
+/// Returns the conditions of `train`, at most one per rollout.
 fn conditions(config: &Config, rollouts: usize) -> Vec<Condition> {
     config.train.perturbations.conditions().take(rollouts).collect()
 }
 
-/// A task that robots could be taught.
+/// A task that robots could be trained for.
 struct Task {
     groups: Groups,
-    /// The config that its training would have.
+    /// Config of its training.
     config: Config,
     dataset: Dataset,
-    /// Training images, as many of each class, class by class.
+    /// Training images, equally many per class, class by class.
     images: Vec<ImageRef>,
 }
 
-/// The task that is asked for.
+/// Reads the requested task.
 fn task(
     options: &Options,
     provenance: &Provenance,
@@ -310,12 +306,12 @@ fn task(
     let labels = classes.iter().flat_map(|class| std::iter::repeat_n(*class, per_class));
     let images = labels.zip(drawn).map(|(label, index)| ImageRef { index, label }).collect();
     let task = Task { groups: groups.clone(), config, dataset, images };
-    // Whatever is wrong with how images are seen is said before anything is measured.
+    // Images that cannot be seen must be refused before anything is measured.
     task.images.first().map_or(Ok(()), |image| task.seen(&task.config.stimulus, image).map(drop))?;
     Ok(Some(task))
 }
 
-/// Whether a training would simulate as the run did: what is measured here holds for no other.
+/// Checks that a training would simulate as the run did: the measurement holds for no other.
 fn same_walks(of_run: &Config, training: &Config) -> Result<(), Error> {
     let steps = |config: &Config| Protocol { rollout: RolloutMode::Fresh, ..config.protocol.clone() };
     let differing = [
@@ -363,7 +359,7 @@ impl Task {
         seen(&self.config.body, stimulus, &self.dataset, Split::Train, image.index)
     }
 
-    /// What a gait could be taught, and under which window.
+    /// Estimates the accuracy that training could reach, under the best window.
     fn taught(
         &self,
         gait: &Gait,
@@ -392,23 +388,21 @@ impl Task {
     }
 }
 
-/// What all robots are measured with.
+/// The parts of a measurement that all robots share.
 struct Measuring<'a> {
     options: &'a Options,
     config: &'a Config,
     probing: Probing,
     task: Option<Task>,
-    /// What was measured before, and where that is.
+    /// Earlier results, with their paths.
     earlier: Vec<(PathBuf, ResponseFile)>,
     run_sha256: &'a str,
     seed: u64,
     session: &'a Session<'a>,
 }
 
-/// What was measured before and might be measured again: in the results' file, and beside the run.
-///
-/// # Errors
-/// If the results' file cannot be read.
+/// Returns earlier results to reuse, from the results' file and from beside the run. Fails if the
+/// results' file cannot be read.
 fn earlier(options: &Options, session: &Session) -> Result<Vec<(PathBuf, ResponseFile)>, Error> {
     let out = replaced(&options.out)?.map(|file| (options.out.clone(), file));
     let beside = Some(options.archive.with_file_name(RESPONSE_JSON)).filter(|beside| *beside != options.out);
@@ -417,8 +411,8 @@ fn earlier(options: &Options, session: &Session) -> Result<Vec<(PathBuf, Respons
 }
 
 impl Measuring<'_> {
-    /// What is known of a gait: its displacements under the first random images, and how many of
-    /// them are of a measurement that ended.
+    /// Returns the known displacements of a gait under the first random images, and how many of
+    /// them belong to a finished measurement.
     fn known(&self, gait: &Gait) -> (&[Option<f64>], usize) {
         let conditions = self.probing.conditions();
         let of_files =
@@ -429,9 +423,9 @@ impl Measuring<'_> {
         })
     }
 
-    /// A robot's response; `None` if most of its rollouts are unstable. `displacements` are those
-    /// under the random images so far, also if it is stopped; `progress` is told how many rollouts
-    /// are done, and how many of those since the last call were not simulated.
+    /// Measures a robot's response; returns `None` if most of its rollouts are unstable.
+    /// `displacements` gets those under the random images so far, even if stopped. `progress` gets
+    /// the number of rollouts done, and how many since the last call were not simulated.
     fn robot(
         &self,
         Subject { id, gait }: &Subject,
@@ -441,8 +435,8 @@ impl Measuring<'_> {
         let Measuring { options, config, probing, session, .. } = self;
         let (known, ended) = self.known(gait);
         let mut shown: Vec<Shown> = Vec::new();
-        // What an earlier measurement ended with costs nothing: it is taken whole, and first. One
-        // that was stopped is gone through batch by batch, as if it had not been.
+        // The rollouts of a finished measurement cost nothing: they are taken whole, and first. A
+        // stopped one is repeated batch by batch, as if it had never been stopped.
         let most = options.images.max(ended);
         let mut rollouts = 0;
         loop {

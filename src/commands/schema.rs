@@ -24,7 +24,7 @@ const CONFIG_VERSION: u32 = 1;
 pub struct Schema {
     /// Its name on the command line.
     pub name: &'static str,
-    /// What it is of.
+    /// The files it describes.
     pub of: &'static str,
     version: u32,
     make: fn() -> Value,
@@ -54,10 +54,10 @@ const fn of<T: JsonSchema>(name: &'static str, of: &'static str, version: u32) -
 }
 
 impl Schema {
-    /// The schema of a name.
+    /// Returns the schema with this name.
     ///
     /// # Errors
-    /// If there is none.
+    /// Returns an error if there is none.
     pub fn named(name: &str) -> Result<Self, Error> {
         ALL.into_iter().find(|schema| schema.name == name).ok_or_else(|| {
             let names = ALL.map(|schema| schema.name).join(", ");
@@ -65,7 +65,7 @@ impl Schema {
         })
     }
 
-    /// It, as JSON Schema draft 7, which most editors know.
+    /// Returns it as JSON Schema draft 7, which most editors know.
     pub fn json(&self) -> Value {
         let mut schema = (self.make)();
         let id = format!("morphcog-{}-{}.schema.json", self.name, self.version);
@@ -80,7 +80,7 @@ fn made<T: JsonSchema>() -> Value {
     SchemaSettings::draft07().into_generator().into_root_schema_for::<T>().to_value()
 }
 
-/// Descriptions without the marks of Rust's documentation.
+/// Removes the markup of Rust's documentation from descriptions.
 fn plain(schema: &mut Value) {
     match schema {
         Value::Object(keys) => {
@@ -96,7 +96,7 @@ fn plain(schema: &mut Value) {
     }
 }
 
-/// Text without links and line breaks: `[name](target)` and ``[`name`]`` become the name.
+/// Removes links and line breaks: `[name](target)` and ``[`name`]`` become the name.
 fn without_links(text: &str) -> String {
     let mut plain = String::new();
     let mut rest = text;

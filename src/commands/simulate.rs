@@ -1,4 +1,4 @@
-//! `morphcog simulate`: any body under any stimuli.
+//! `morphcog simulate`: simulates any body under any stimuli.
 
 use crate::base::Grid;
 use crate::base::error::{Error, ErrorKind};
@@ -15,20 +15,19 @@ use std::fmt;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// A body, what it sees, and for how long.
+/// A body, its stimuli, and the length of the simulation.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
-    /// The body, rows of 0…6.
+    /// The body as rows of 0…6.
     pub body: Body,
     /// One stimulus for the whole simulation: H × W in [0, 1].
     stimulus: Option<Grid<f64>>,
-    /// Or several, each shown for `switch_every` control steps, again from the first after the
-    /// last.
+    /// Or several, each for `switch_every` control steps; after the last, the first follows.
     #[serde(default, deserialize_with = "bounded")]
     stimuli: Option<Vec<Grid<f64>>>,
     switch_every: Option<u64>,
-    /// Whether the robot goes back to its initial state at every switch.
+    /// True if the robot returns to its initial state at every switch.
     #[serde(default)]
     reset_between: bool,
     /// Grid column of the body's left edge.
@@ -36,17 +35,17 @@ pub struct Scenario {
     start_column: i64,
     /// Grid row of its bottom row; 2 is on the ground.
     start_row: Option<u32>,
-    /// Control steps in all.
+    /// Number of control steps.
     control_steps: Option<u64>,
-    /// The constants of the simulator, where they differ from the defaults.
+    /// Constants of the simulator that differ from the defaults.
     #[serde(default)]
     physics: Physics,
 }
 
-/// Most memory that stimuli may need \[bytes\].
+/// Most memory for stimuli \[bytes\].
 const MOST_STIMULI: usize = 128 << 20;
 
-/// Reads stimuli as long as they need no more memory than [`MOST_STIMULI`].
+/// Reads stimuli of at most [`MOST_STIMULI`] bytes.
 fn bounded<'de, D: Deserializer<'de>>(reader: D) -> Result<Option<Vec<Grid<f64>>>, D::Error> {
     struct Stimuli;
     impl<'de> Visitor<'de> for Stimuli {
@@ -57,8 +56,7 @@ fn bounded<'de, D: Deserializer<'de>>(reader: D) -> Result<Option<Vec<Grid<f64>>
         fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
             let (mut stimuli, mut bytes) = (Vec::new(), 0);
             while let Some(stimulus) = list.next_element::<Grid<f64>>()? {
-                // The pixels and their allocation, and the place in the list, which grows by
-                // doubling.
+                // Pixels and their allocation, and an entry in the list, which doubles as it grows.
                 bytes += stimulus.area() * size_of::<f64>() + 16 + 2 * size_of::<Grid<f64>>();
                 if bytes > MOST_STIMULI {
                     let (count, pixels) = (stimuli.len(), stimulus.area());
@@ -95,14 +93,14 @@ fn paper_column() -> i64 {
     493
 }
 
-/// Default length of a simulation: ten actuation cycles.
+/// Default number of control steps: ten actuation cycles.
 const CONTROL_STEPS: u64 = 500;
 
 impl Scenario {
-    /// Reads a scenario; of the path `-`, from standard input.
+    /// Reads a scenario, from standard input if the path is `-`.
     ///
     /// # Errors
-    /// What is wrong with the file, with its line and key.
+    /// Returns an error with line and key if the file is wrong.
     pub fn read(path: &Path) -> Result<Self, Error> {
         if path == Path::new("-") {
             let text = read_limited(std::io::stdin());
@@ -113,7 +111,7 @@ impl Scenario {
         Scenario::parse(&text, &path.display().to_string())
     }
 
-    /// Reads its text; `name` stands in messages.
+    /// Parses a scenario; errors mention `name`.
     ///
     /// # Errors
     /// As [`Scenario::read`].
@@ -176,34 +174,34 @@ impl Scenario {
         Ok(())
     }
 
-    /// What is shown, in turn; nothing if all is dark.
+    /// Returns the stimuli in turn, none if all is dark.
     pub fn stimuli(&self) -> &[Grid<f64>] {
         self.stimuli.as_deref().unwrap_or(self.stimulus.as_slice())
     }
 
-    /// Where it begins.
+    /// Returns the position where it begins.
     pub fn start(&self) -> Start {
         Start { column: self.start_column, row: self.start_row.unwrap_or(self.physics.ground_row) }
     }
 
-    /// The constants of its simulator.
+    /// Returns the constants of the simulator.
     pub fn physics(&self) -> &Physics {
         &self.physics
     }
 
-    /// Control steps of the simulation.
+    /// Returns the number of control steps.
     pub fn control_steps(&self) -> u64 {
         let shown = self.switch_every.map(|every| every.saturating_mul(self.stimuli().len() as u64));
         self.control_steps.or(shown).unwrap_or(CONTROL_STEPS)
     }
 }
 
-/// Simulates the scenario; `line` gets the CSV's lines: `step,com_x,com_y`, then the centre of mass
-/// \[world units\] before the first and after every control step. With `points` also every point
-/// (`x_0,y_0`, …, in the order of EvoGym) and every pixel (`pixel_ROW_COLUMN`) of that step.
+/// Simulates the scenario and passes the CSV to `line`, line by line: `step,com_x,com_y`, then the
+/// centre of mass \[world units\] before the first and after every control step. `points` adds
+/// every point (`x_0,y_0`, …, in EvoGym's order) and pixel (`pixel_ROW_COLUMN`) of that step.
 ///
 /// # Errors
-/// [`crate::base::error::ErrorKind::Unstable`] if the simulation ends early, and what `line` says.
+/// Returns [`crate::base::error::ErrorKind::Unstable`] if it ends early, or the error of `line`.
 pub fn simulate(
     scenario: &Scenario,
     points: bool,
@@ -243,8 +241,7 @@ pub fn simulate(
             }
         }
         world.step().map_err(|unstable| {
-            // With resets the simulation's own clock starts again; what is reported counts the
-            // scenario's steps.
+            // Resets restart the simulation's own clock; errors count the scenario's steps.
             let unstable = crate::sim::Unstable { control_step: step, ..unstable };
             Error::unstable(unstable.to_string())
         })?;
@@ -253,12 +250,11 @@ pub fn simulate(
     Ok(())
 }
 
-/// Writes the CSV of a scenario's file to a file, also of a simulation that ends unstable, up to
-/// its end.
+/// Writes the CSV of a scenario to a file; that of an unstable simulation goes up to its end.
 ///
 /// # Errors
-/// As [`Scenario::read`] and [`simulate`], and if the file cannot be written, or is the scenario's; if
-/// it was stopped: the file is then as it was.
+/// As [`Scenario::read`] and [`simulate`]; if the file cannot be written or is the scenario's; if
+/// the session was stopped, which leaves the file unchanged.
 pub fn to_file(from: &Path, points: bool, path: &Path, session: &Session) -> Result<(), Error> {
     let scenario = &Scenario::read(from)?;
     if path.exists() && path.canonicalize().ok() == from.canonicalize().ok() {
@@ -266,7 +262,7 @@ pub fn to_file(from: &Path, points: bool, path: &Path, session: &Session) -> Res
         return Err(Error::argument("out", path.display(), text));
     }
     folder::writable(path)?;
-    // Line by line: a long simulation with all points has gigabytes.
+    // Line by line, since a long simulation with all points has gigabytes.
     let mut outcome = Ok(());
     let written = write_whole(path, |file| {
         let (mut file, mut failed) = (BufWriter::new(file), None);
@@ -290,9 +286,9 @@ pub fn to_file(from: &Path, points: bool, path: &Path, session: &Session) -> Res
     outcome
 }
 
-/// A number with 17 significant digits, which name every f64.
+/// Formats a number with 17 significant digits, which identify every f64.
 pub fn digits17(value: f64) -> String {
-    // Nothing has no sign.
+    // Makes -0 into 0.
     let value = value + 0.0;
     let before = if value == 0.0 { 0.0 } else { libm::log10(value.abs()).floor() };
     let decimals = (16.0 - before).clamp(0.0, 40.0) as usize;
@@ -337,8 +333,8 @@ mod tests {
 
     #[test]
     fn stimuli_are_bounded_by_the_memory_that_they_need() {
-        // As a file of 240 MB: forty million of them took 3.7 GB. Refused while it is read: this
-        // one has no end.
+        // Forty million of them, a file of 240 MB, took 3.7 GB. This endless file must be refused
+        // while it is read.
         let many = 2_000_000;
         let text = format!("{{\"body\": [[3]], \"switch_every\": 1, \"stimuli\": [{}", "[[1]],".repeat(many));
         let error = Scenario::parse(&text, "scenario.json").unwrap_err().message;

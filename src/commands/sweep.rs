@@ -1,4 +1,4 @@
-//! `morphcog sweep`: a plan is one config, or one archive of gaits, and what is varied; every
+//! `morphcog sweep`: a plan has one config, or one archive of gaits, and keys to vary; every
 //! combination is a task.
 
 use crate::base::error::Error;
@@ -18,45 +18,45 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Most tasks of a sweep: a slip in a list makes millions quickly.
+/// Most tasks of a sweep: a slip in a list soon makes millions.
 const MOST: usize = 100_000;
 
-/// Most characters of a varied value in a task's name; longer ones are a hash.
+/// Most characters of a varied value in a task's name; longer values are hashed.
 const LONGEST: usize = 24;
 
-/// What is swept: every combination of `vary`, `groups` (or `pairs`) and `seeds` is a task.
+/// Plan of a sweep: every combination of `vary`, `groups` (or `pairs`) and `seeds` is a task.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SweepPlan {
-    /// A config file, from the plan's folder on, or the name of a built-in one: the tasks evolve.
+    /// A config file, relative to the plan's folder, or the name of a built-in one: tasks evolve.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub config: Option<String>,
-    /// Instead, a run.json of gaits or its folder, from the plan's folder on: the tasks train.
+    /// Or a run.json of gaits, or its folder, relative to the plan's folder: tasks train.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub archive: Option<PathBuf>,
-    /// Which robots of `archive` are tried, as `--robots` of `morphcog train`. Default "top:4".
+    /// Robots of `archive` to try, as with `--robots` of `morphcog train`. Default "top:4".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub robots: Option<String>,
-    /// Seeds. Default: that of the config, or of the archive's run.
+    /// Seeds. Default: that of the config or of the archive's run.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub seeds: Vec<u64>,
-    /// Keys that are the same in all tasks, as with `--set`.
+    /// Keys set in all tasks, as with `--set`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub set: Vec<String>,
-    /// What is told apart: two groups of classes each, as "4|9".
+    /// Groups of classes to tell apart, two per entry, as "4|9".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub groups: Vec<String>,
-    /// Classes: every two of them are told apart, as 4|9.
+    /// Classes to tell apart in pairs, each with every other, as 4|9.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pairs: Vec<u8>,
-    /// Keys that are varied, each with a list of values.
+    /// Keys to vary, each with a list of values.
     #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
     #[schemars(with = "serde_json::Map<String, serde_json::Value>")]
     pub vary: toml::Table,
-    /// After each run, an audit.
+    /// An audit after each run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub audit: Option<AuditStep>,
-    /// After that, a test on held-out images.
+    /// A test on held-out images after that.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub eval: Option<EvalStep>,
 }
@@ -66,22 +66,22 @@ pub struct SweepPlan {
 struct Setting {
     key: String,
     value: toml::Value,
-    /// How it stands in a task's name.
+    /// Its form in a task's name.
     word: String,
 }
 
-/// What all tasks begin with.
+/// The common origin of all tasks.
 enum Base {
-    /// The config's name, and what stands before the plan's changes.
+    /// The config's name, and the config before the plan's changes.
     Evolve(String, Box<Config>),
     Train(PathBuf, Box<StoredRun>),
 }
 
 impl SweepPlan {
-    /// Reads a plan (TOML, or JSON if its name ends in `.json`), with `overrides` set.
+    /// Reads a plan (TOML, or JSON if its name ends in `.json`), with `overrides` applied.
     ///
     /// # Errors
-    /// What is wrong with it, with file, line and key.
+    /// Returns an error with file, line and key if the plan is wrong.
     pub fn load(path: &Path, overrides: &[String]) -> Result<Self, Error> {
         let text = read_given(path).map_err(|error| {
             let schema = Remedy::Run(Invocation::new("schema").value("sweep"), "says what a plan holds");
@@ -95,7 +95,7 @@ impl SweepPlan {
         reading::changed(plan, overrides, check, |error| reading::placed(error, &text, format, &name))
     }
 
-    /// Checks what a type cannot, and no task.
+    /// Checks what the types cannot, but no task.
     fn check(&self) -> Result<(), Error> {
         match (&self.config, &self.archive) {
             (Some(_), Some(_)) => {
@@ -130,7 +130,7 @@ impl SweepPlan {
         Steps { audit: self.audit.clone(), eval: self.eval.clone() }
     }
 
-    /// The two groups of each task, if the plan names any.
+    /// Returns the two groups of each task, if the plan names any.
     fn groups(&self) -> Result<Vec<Groups>, Error> {
         let mut all: Vec<Groups> = Vec::new();
         for (number, text) in (1..).zip(&self.groups) {
@@ -141,7 +141,7 @@ impl SweepPlan {
         for (k, &a) in self.pairs.iter().enumerate() {
             all.extend(self.pairs[k + 1..].iter().map(|&b| [vec![a.min(b)], vec![a.max(b)]].into()));
         }
-        // Which group walks which way is up to the robots: 1|0 is 0|1.
+        // Robots choose which group walks which way, so 1|0 is 0|1.
         let same = |groups: &Groups| -> BTreeSet<BTreeSet<u8>> {
             groups.classes().iter().map(|group| group.iter().copied().collect()).collect()
         };
@@ -154,7 +154,7 @@ impl SweepPlan {
         Ok(all)
     }
 
-    /// The varied keys, each with its values.
+    /// Returns the varied keys, each with its values.
     fn varied(&self) -> Result<Vec<Vec<Setting>>, Error> {
         // TOML reads `a.b = […]` as a table.
         let mut flat = Settings::new();
@@ -187,11 +187,11 @@ impl SweepPlan {
         Ok(all)
     }
 
-    /// The tasks, numbered from 1 in this order: varied keys by their names, the last one changing
-    /// first; then groups; then seeds.
+    /// Returns the tasks, numbered from 1 in this order: varied keys by their names, the last one
+    /// changing fastest; then groups; then seeds.
     ///
     /// # Errors
-    /// What is wrong with the plan, or with some of its tasks: all of that at once.
+    /// Returns everything that is wrong with the plan, or with its tasks, at once.
     pub fn tasks(&self, path: &Path) -> Result<Vec<Task>, Vec<Error>> {
         let one = |error: Error| vec![error.in_place(&path.display().to_string())];
         let sets = |wanted: &dyn Fn(&str) -> bool| {
@@ -246,7 +246,7 @@ impl SweepPlan {
         if let Some(task) = tasks.iter().find(|task| !names.insert(task.name.to_lowercase())) {
             return Err(one(Error::at_key("vary", format!("two tasks would be called {}", task.name))));
         }
-        // Two values may be one, such as 1 and 1.0.
+        // Two values may be equal, such as 1 and 1.0.
         let mut experiments: BTreeMap<String, &str> = BTreeMap::new();
         for task in &tasks {
             let config = sha256_hex(format!("{:?}", task.run.config()).as_bytes());
@@ -293,13 +293,13 @@ impl SweepPlan {
             Base::Evolve(config_name, config) => {
                 set.extend(groups.map(|groups| format!("task.groups={:?}", groups.classes())));
                 set.push(format!("seed={seed}"));
-                // Of a config with splits, the groups are in their place.
+                // Groups replace the splits of a config.
                 let mut config = (**config).clone();
                 if groups.is_some() {
                     let classes = config.classes();
                     (config.task.splits, config.task.same_way_bin) = (None, false);
                     config.task.groups = groups.map(|groups| groups.classes().clone());
-                    // Images that a config names are of the classes of its own task.
+                    // Images that a config names belong to the classes of its own task.
                     if config.classes() != classes {
                         config.data.train_images = None;
                     }
@@ -339,7 +339,6 @@ impl SweepPlan {
 }
 
 impl Base {
-    /// The name of a task.
     fn name(&self, combination: &[&Setting], groups: Option<&Groups>, seed: u64) -> String {
         let base = match self {
             Base::Evolve(name, _) => name.clone(),
@@ -358,27 +357,27 @@ impl Base {
     }
 }
 
-/// A value as text: a text without its quotes.
+/// Formats a value; strings lose their quotes.
 fn text(value: &toml::Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_string)
 }
 
-/// A value in a file's name: what shells and file systems take as it is.
+/// Formats a value for a file name, so that shells and file systems take it unchanged.
 fn word(value: &toml::Value) -> String {
     let text = text(value);
     let plain = |c: char| if c.is_ascii_alphanumeric() || "._+-".contains(c) { c } else { '_' };
     let word: String = text.chars().map(plain).collect();
     let is_same = word == text && !word.is_empty() && word.len() <= LONGEST;
-    // Two texts that become the same word are two values all the same.
+    // Two texts that become the same word are still two values.
     let hash = || sha256_hex(text.as_bytes()).chars().take(8).collect::<String>();
     if is_same { word } else { hash() }
 }
 
-/// Tasks that cannot be, by what is wrong with them.
+/// Refused tasks, by their error.
 #[derive(Default)]
 struct Refused {
     count: usize,
-    /// The error, its first task, and how many more there are.
+    /// The error, its first task, and the number of further ones.
     by_error: Vec<(Error, usize, String, usize)>,
 }
 

@@ -1,4 +1,4 @@
-//! The paper's table, ours beside the paper's.
+//! The paper's table, with our results beside the paper's.
 
 use crate::analysis::published;
 use crate::base::error::Error;
@@ -10,18 +10,18 @@ use crate::store::eval::EvalFile;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// A row: a task.
+/// A row of the table: one task.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// The task, as "0|1".
     pub task: String,
-    /// Robots tested.
+    /// Number of robots tested.
     pub robots: usize,
-    /// Those of them that are physical.
+    /// Number of physical ones among them.
     pub physical: usize,
-    /// Robots that were audited to find them.
+    /// Number of robots audited to find them.
     pub audited: usize,
-    /// Their mean accuracy \[%\]; none of no robots.
+    /// Their mean accuracy \[%\]; `None` without robots.
     pub accuracy: Option<f64>,
     /// Its standard deviation over the robots \[%\].
     pub deviation: Option<f64>,
@@ -29,22 +29,22 @@ pub struct Row {
     pub interval: Option<[f64; 2]>,
     /// Mean balanced accuracy \[%\].
     pub balanced_accuracy: Option<f64>,
-    /// Always answering the larger group \[%\].
+    /// Accuracy of always answering the larger group \[%\].
     pub larger_group: Option<f64>,
-    /// Capacity in neurons; none: no match.
+    /// Capacity in neurons; `None` without a match.
     pub mlp: Option<Crossing>,
-    /// Capacity in kernels; none: no match.
+    /// Capacity in kernels; `None` without a match.
     pub cnn: Option<Crossing>,
     /// The paper's accuracy \[%\].
     pub paper_accuracy: Option<f64>,
-    /// The paper's capacity in neurons; none: no match.
+    /// The paper's capacity in neurons; `None` without a match.
     pub paper_mlp: Option<f64>,
-    /// The paper's capacity in kernels; none: no match.
+    /// The paper's capacity in kernels; `None` without a match.
     pub paper_cnn: Option<f64>,
 }
 
 impl Row {
-    /// With what the paper says only.
+    /// Returns a row with the paper's values only.
     pub(crate) fn new(dataset: &str, task: &str) -> Self {
         let paper = published::row(dataset, task);
         Row {
@@ -65,7 +65,7 @@ impl Row {
         }
     }
 
-    /// Adds what a test and networks found.
+    /// Adds the results of a test and of networks.
     pub(crate) fn fill(&mut self, report: &EvalFile, capacity: &CapacityFile) {
         if let Some(mean) = report.means.get(&self.task) {
             self.robots = mean.robots;
@@ -81,10 +81,7 @@ impl Row {
     }
 }
 
-/// Writes `reproduction.json` and `reproduction.csv` into a folder; the files.
-///
-/// # Errors
-/// If they cannot be written.
+/// Writes `reproduction.json` and `reproduction.csv` into a folder, and returns their paths.
 pub(crate) fn write(folder: &Path, scale: f64, rows: &[Row]) -> Result<Vec<PathBuf>, Error> {
     let about = serde_json::json!({
         "format": "morphcog-reproduction", "format_version": 1, "program_version": env!("CARGO_PKG_VERSION"),

@@ -1,5 +1,4 @@
-//! `morphcog team`: robots of several runs, each with two groups of classes of its own, answer
-//! together which class an image is of.
+//! `morphcog team`: robots of several runs, each for two groups, classify images together.
 
 use crate::analysis::votes::{Accuracy, Ballot, CLIP};
 use crate::base::Grid;
@@ -34,40 +33,38 @@ use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-/// Who is in the team, and what it is shown.
+/// Options of a team's test.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The run.json files.
     pub archives: Vec<PathBuf>,
-    /// Which of their robots: ids are looked for in all of them together, all else in each by
-    /// itself.
+    /// Their robots. Ids are looked up in all runs together; other selections apply to each run.
     pub robots: Selection,
-    /// The classes to tell apart; `None`: all of the dataset.
+    /// Classes to tell apart; `None`: all of the dataset.
     pub classes: Option<Vec<u8>>,
-    /// How many images.
+    /// Number of images.
     pub images: HowMany,
-    /// Which images.
+    /// Split of the images.
     pub split: HeldOut,
-    /// Seed of what is drawn: images, and robots with `random:N`.
+    /// Seed for drawing images, and robots with `random:N`.
     pub seed: u64,
-    /// Where the results go (team.json; team.csv beside it).
+    /// Path of the results (team.json; team.csv goes beside it).
     pub out: PathBuf,
 }
 
-/// A test's end.
+/// Result of a team's test.
 #[derive(Clone, Debug)]
 pub struct Finished {
     /// The content of team.json.
     pub file: TeamFile,
-    /// Why that is not, or not as a whole, in its file, if so.
+    /// The error if the results could not be written, or only in part.
     pub unwritten: Option<Error>,
 }
 
-/// Shows images to a team. The file is written after every robot, and the same command goes on from
-/// there.
+/// Tests a team on images. Writes the file after every robot; the same command goes on from there.
 ///
 /// # Errors
-/// If robots and classes do not go together; what is wrong with archive, data or selection.
+/// Returns an error if robots do not fit the classes, or archive, data or selection is wrong.
 pub fn team(options: &Options, session: &Session) -> Result<Finished, Error> {
     let archives = options.archives.iter();
     let sources = archives.map(|path| StoredRun::read(path)).collect::<Result<Vec<StoredRun>, Error>>()?;
@@ -119,7 +116,7 @@ pub fn team(options: &Options, session: &Session) -> Result<Finished, Error> {
     };
     let images = file.images.clone();
     let hashes: Vec<String> = sources.iter().map(|source| source.run.fingerprint()).collect();
-    // Those that are known stay in the file from the beginning, in the team's order.
+    // Known members stay in the file from the beginning, in the team's order.
     let known = known(options, &file)?;
     let mut members: Vec<Option<Member>> = robots
         .iter()
@@ -166,7 +163,7 @@ pub fn team(options: &Options, session: &Session) -> Result<Finished, Error> {
     Ok(Finished { file, unwritten: unwritten.error() })
 }
 
-/// Whether robots of two runs were trained on the same data.
+/// Checks that two runs have robots of the same data.
 fn same_data(first: &StoredRun, other: &StoredRun) -> Result<(), Error> {
     let (a, b) = (&first.run, &other.run);
     if a.dataset == b.dataset && a.config.data.builtin == b.config.data.builtin {
@@ -177,7 +174,7 @@ fn same_data(first: &StoredRun, other: &StoredRun) -> Result<(), Error> {
     Err(Error::input(text).advice(format!("these are of {}: leave them out", b.dataset.name)))
 }
 
-/// The robots of the team: those that are named from all runs together, else of each run by itself.
+/// Returns the robots of the team: ids from all runs together, other selections from each run.
 fn chosen<'a>(options: &Options, sources: &'a [StoredRun]) -> Result<Vec<Chosen<'a>>, Error> {
     if options.robots.validated().is_some() {
         let text = "expected another selection: a team does not choose by images";
@@ -196,7 +193,7 @@ fn chosen<'a>(options: &Options, sources: &'a [StoredRun]) -> Result<Vec<Chosen<
     Ok(all)
 }
 
-/// The classes to tell apart, in order.
+/// Returns the classes to tell apart, in order.
 fn classes(options: &Options, dataset: &Dataset) -> Result<Vec<u8>, Error> {
     let all = dataset.classes(Split::Train);
     let mut classes = options.classes.clone().unwrap_or_else(|| all.clone());
@@ -215,7 +212,7 @@ fn classes(options: &Options, dataset: &Dataset) -> Result<Vec<u8>, Error> {
     Ok(classes)
 }
 
-/// What results on these images are called if nothing is said.
+/// Returns the default file name of results on these images.
 pub fn own_name(split: HeldOut) -> &'static str {
     match split {
         HeldOut::Test => TEAM_JSON,
@@ -223,7 +220,7 @@ pub fn own_name(split: HeldOut) -> &'static str {
     }
 }
 
-/// The two groups that a robot tells apart.
+/// Returns the two groups that a robot tells apart.
 fn split_of(source: &StoredRun, chosen: &Chosen) -> Result<grouping::Split, Error> {
     let grouping = source.run.config.grouping()?;
     let text =
@@ -232,7 +229,7 @@ fn split_of(source: &StoredRun, chosen: &Chosen) -> Result<grouping::Split, Erro
     of_robot.ok_or_else(|| Error::input(text()).remedy(Remedy::ChooseRobots(None)))
 }
 
-/// Whether every class has a robot, and every robot classes of the team.
+/// Checks that every class has a robot, and every robot only classes of the team.
 fn covered(robots: &[Chosen], splits: &[grouping::Split], classes: &[u8]) -> Result<(), Error> {
     let is_unknown = |class: &&u8| splits.iter().all(|split| split.group(**class).is_none());
     let missing: Vec<String> = classes.iter().filter(is_unknown).map(u8::to_string).collect();
@@ -253,7 +250,7 @@ fn covered(robots: &[Chosen], splits: &[grouping::Split], classes: &[u8]) -> Res
     }
 }
 
-/// Images of the training split that no run was trained on and no robot was chosen by.
+/// Draws images of the training split that no run was trained on and no robot was chosen by.
 fn validation_images(
     options: &Options,
     sources: &[StoredRun],
@@ -265,8 +262,7 @@ fn validation_images(
     images_besides(&besides, &runs, classes, dataset, Some("images"), options.images)
 }
 
-/// Whether two tests show the same images in the same way: what one found of a robot holds for the
-/// other.
+/// Returns true if two tests use the same images in the same way, so that members carry over.
 fn is_same(a: &TeamFile, b: &TeamFile) -> bool {
     let about = |file: &TeamFile| {
         let TeamFile { program_version, test_sha256, images, cycles, split, .. } = file;
@@ -275,24 +271,22 @@ fn is_same(a: &TeamFile, b: &TeamFile) -> bool {
     about(a) == about(b)
 }
 
-/// Robots that an earlier test on the same images, stopped or with fewer of them, has shown these.
-///
-/// # Errors
-/// If the file of an earlier test cannot be read.
+/// Returns the members of an earlier test on the same images, stopped or with fewer robots. Fails
+/// if its file cannot be read.
 fn known(options: &Options, now: &TeamFile) -> Result<Vec<Member>, Error> {
     let earlier = replaced::<TeamFile>(&options.out)?.filter(|file| is_same(file, now));
     Ok(earlier.map_or(Vec::new(), |file| file.members))
 }
 
-/// Writes what is known so far; the results of another test that are in the file are set aside.
+/// Writes the results so far; sets those of another test in the file aside.
 fn write(options: &Options, file: &TeamFile, session: &Session) -> Result<(), Error> {
     let is_same = || TeamFile::read(&options.out).is_ok_and(|known| is_same(&known, file));
     results::make_room(&options.out, is_same, session)?;
     file.write(&options.out)
 }
 
-/// What answers the same images without bodies: on the pixels that the robots see, all together; a
-/// pair of classes that a robot tells apart, on its own.
+/// Computes baselines without bodies on the same images, as all robots see them together; for a
+/// pair of classes that a robot tells apart, as that robot sees them.
 fn baselines(
     file: &TeamFile,
     (sources, robots, splits): (&[StoredRun], &[Chosen], &[grouping::Split]),
@@ -327,7 +321,7 @@ fn baselines(
     let against_rest: Vec<Linear> = classes.iter().map(against_rest).collect();
     let largest = |stimulus: &Grid<f64>| {
         let values: Vec<f64> = against_rest.iter().map(|linear| linear.value(stimulus)).collect();
-        // The first of several that are as large.
+        // Ties go to the first.
         let best =
             (1..values.len()).fold(0, |best, next| if values[next] > values[best] { next } else { best });
         classes[best]
@@ -354,7 +348,7 @@ fn baselines(
     };
     let pairs =
         classes.iter().enumerate().flat_map(|(number, a)| classes[number + 1..].iter().map(|b| (*a, *b)));
-    // Of each pair the values of its function, image by image.
+    // The values of each pair's function, image by image.
     let pairs: Vec<(Judge, Vec<f64>)> = pairs.map(|(a, b)| pair(a, b)).collect::<Result<_, Error>>()?;
     let voted = |image: usize| {
         let walks = pairs.iter().map(|(judge, values)| (judge, Some(values[image])));

@@ -1,5 +1,4 @@
-//! A real browser without a window, driven over its debugging pipe: JSON messages that end with a
-//! zero byte.
+//! A real browser without a window, driven by JSON messages over its debugging pipe.
 
 use super::program::{Sandbox, skipped};
 use base64::Engine;
@@ -12,7 +11,7 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-/// Nothing that is waited for may take longer.
+/// Time limit of every wait.
 const LIMIT: Duration = Duration::from_secs(25);
 const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 const FLAGS: [&str; 12] = [
@@ -30,7 +29,7 @@ const FLAGS: [&str; 12] = [
     "--remote-debugging-pipe",
 ];
 
-/// Where a Chromium is; says that the test is skipped if there is none.
+/// Finds a Chromium; without one, reports the test as skipped.
 pub fn found() -> Option<PathBuf> {
     let found = named();
     if found.is_none() {
@@ -39,7 +38,7 @@ pub fn found() -> Option<PathBuf> {
     found
 }
 
-/// What `MORPHCOG_BROWSER` names, or one of the usual names on the path.
+/// Returns the path in `MORPHCOG_BROWSER`, or one of the usual names on the PATH.
 fn named() -> Option<PathBuf> {
     if let Some(named) = std::env::var_os("MORPHCOG_BROWSER").filter(|name| !name.is_empty()) {
         return Some(named.into());
@@ -49,18 +48,18 @@ fn named() -> Option<PathBuf> {
     NAMES.iter().find_map(|name| places().map(|folder| folder.join(name)).find(|file| file.is_file()))
 }
 
-/// A browser that runs; ended when this goes.
+/// A running browser; dropping it ends it.
 pub struct Browser {
     child: Child,
     to: ChildStdin,
     from: Receiver<Value>,
-    /// Events that came while an answer was waited for.
+    /// Events that came while waiting for an answer.
     events: VecDeque<Value>,
     number: u64,
 }
 
 impl Browser {
-    /// Starts it with a profile of its own in the sandbox.
+    /// Starts it with its own profile in the sandbox.
     pub fn start(program: &Path, sandbox: &Sandbox) -> Self {
         // It reads its commands from file 3 and answers to file 4.
         let mut child = Command::new("sh")
@@ -115,7 +114,7 @@ impl Browser {
         }
     }
 
-    /// A new tab of a size.
+    /// Opens a new tab of this size.
     pub fn tab(&mut self, width: u32, height: u32, dark: bool) -> Tab<'_> {
         let target = self.call(None, "Target.createTarget", json!({ "url": "about:blank" }));
         let id = target["targetId"].clone();
@@ -136,7 +135,7 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // It ends when its pipe does; if not, it is ended.
+        // It should end with its pipe; if not, it is killed.
         let _ = self.to.write_all(b"{\"id\":0,\"method\":\"Browser.close\"}\0");
         let until = Instant::now() + Duration::from_secs(3);
         while matches!(self.child.try_wait(), Ok(None)) && Instant::now() < until {
@@ -147,12 +146,11 @@ impl Drop for Browser {
     }
 }
 
-/// A tab.
 pub struct Tab<'a> {
     browser: &'a mut Browser,
     session: String,
     id: Value,
-    /// What points: "mouse" or "pen".
+    /// Pointing device: "mouse" or "pen".
     pub pointer: &'static str,
 }
 
@@ -167,7 +165,7 @@ impl Tab<'_> {
         self.call("Page.navigate", json!({ "url": url }));
     }
 
-    /// What an expression comes to.
+    /// Returns the value of an expression.
     #[track_caller]
     pub fn eval(&mut self, expression: &str) -> Value {
         let params = json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
@@ -186,7 +184,7 @@ impl Tab<'_> {
         }
     }
 
-    /// The text of an element.
+    /// Returns the text of an element.
     #[track_caller]
     pub fn text(&mut self, selector: &str) -> String {
         let text = self.eval(&format!("document.querySelector('{selector}').textContent"));
@@ -201,10 +199,10 @@ impl Tab<'_> {
         self.call("Input.dispatchMouseEvent", params);
     }
 
-    /// Left, top, width, height of an element that is in sight.
+    /// Returns left, top, width and height of an element, scrolled into view.
     #[track_caller]
     pub fn place(&mut self, selector: &str) -> [f64; 4] {
-        // What was scrolled is where it is to the mouse only after the next picture.
+        // The mouse finds scrolled elements only after the next frame.
         let expression = format!(
             "(async () => {{ const e = document.querySelector('{selector}'), y = scrollY; \
              e.scrollIntoView({{ block: 'center', behavior: 'instant' }}); \
@@ -214,7 +212,7 @@ impl Tab<'_> {
         serde_json::from_value(self.eval(&expression)).unwrap()
     }
 
-    /// Clicks into the middle of an element.
+    /// Clicks the middle of an element.
     #[track_caller]
     pub fn click(&mut self, selector: &str) {
         let [x, y, w, h] = self.place(selector);
@@ -228,23 +226,23 @@ impl Tab<'_> {
         self.release(line[line.len() - 1]);
     }
 
-    /// Puts the mouse down at a place.
+    /// Presses the mouse button at a position.
     pub fn press(&mut self, place: [f64; 2]) {
         self.mouse("mouseMoved", place, 0);
         self.mouse("mousePressed", place, 1);
     }
 
-    /// Moves the mouse that is down along a line.
+    /// Moves the pressed mouse along a line.
     pub fn trace(&mut self, line: &[[f64; 2]]) {
         line.iter().for_each(|place| self.mouse("mouseMoved", *place, 1));
     }
 
-    /// Lifts the mouse at a place.
+    /// Releases the mouse button at a position.
     pub fn release(&mut self, place: [f64; 2]) {
         self.mouse("mouseReleased", place, 0);
     }
 
-    /// Presses a key: its name, and the text it types if it does.
+    /// Presses a key, given by its name and the text it types, if any.
     pub fn key(&mut self, key: &str, text: &str) {
         for kind in ["keyDown", "keyUp"] {
             let text = if kind == "keyDown" { text } else { "" };
@@ -252,13 +250,13 @@ impl Tab<'_> {
         }
     }
 
-    /// A picture of what is in sight.
+    /// Takes a picture of the visible part.
     pub fn screenshot(&mut self) -> Vec<u8> {
         let shot = self.call("Page.captureScreenshot", json!({ "format": "png" }));
         BASE64.decode(shot["data"].as_str().unwrap()).unwrap()
     }
 
-    /// What the console has complained of, and scripts that failed.
+    /// Returns errors on the console, and those of scripts.
     pub fn complaints(&mut self) -> Vec<String> {
         self.eval("0");
         let own = |event: &Value| event["sessionId"] == self.session.as_str();
@@ -277,7 +275,7 @@ impl Tab<'_> {
     }
 }
 
-/// Writes what is in sight into the folder that MORPHCOG_SCREENSHOTS names, if it does.
+/// Writes a screenshot into the folder that MORPHCOG_SCREENSHOTS names, if any.
 pub fn keep_picture(name: &str, shot: &[u8]) {
     if let Some(folder) = std::env::var_os("MORPHCOG_SCREENSHOTS") {
         std::fs::write(std::path::Path::new(&folder).join(name), shot).unwrap();

@@ -1,8 +1,8 @@
-//! Inputs that are broken on purpose: a small mutator, the same for the same number.
+//! Deliberately broken inputs: a small mutator, deterministic by its seed.
 
 use serde_json::{Map, Value};
 
-/// A stream of numbers of no great quality (splitmix64).
+/// A simple stream of random numbers (splitmix64).
 pub struct Dice(u64);
 
 impl Dice {
@@ -18,7 +18,7 @@ impl Dice {
         z ^ (z >> 31)
     }
 
-    /// From 0 to below `most`, which is more than 0.
+    /// Returns a number below `most`, which is above 0.
     pub fn below(&mut self, most: usize) -> usize {
         (self.next() % most as u64) as usize
     }
@@ -28,7 +28,7 @@ impl Dice {
     }
 }
 
-/// What commands a terminal, forges lines or turns the direction of writing.
+/// Characters that control terminals, forge lines or reverse the direction of writing.
 pub const EVIL: &str = "\u{1b}[2J\u{1b}]0;x\u{7}\nerror: forged\r\u{9b}31m\u{202e}\u{0}";
 
 const PIECES: [&str; 24] = [
@@ -58,7 +58,7 @@ const PIECES: [&str; 24] = [
     "\u{feff}",
 ];
 
-/// A text with one to four wounds that know nothing of what it means.
+/// Damages a text in one to four places, ignoring its structure.
 pub fn bytes(dice: &mut Dice, text: &[u8]) -> Vec<u8> {
     let mut text = text.to_vec();
     for _ in 0..=dice.below(4) {
@@ -91,8 +91,7 @@ pub fn bytes(dice: &mut Dice, text: &[u8]) -> Vec<u8> {
     text
 }
 
-/// A value with one to three changes of what it says; half of the time only of how much it says, so
-/// that it is often read to its end and used.
+/// Changes one to three parts of a value, half of the time only leaves, which readers may accept.
 pub fn value(dice: &mut Dice, value: &Value) -> Value {
     let mut value = value.clone();
     if dice.below(2) == 0 {
@@ -110,11 +109,11 @@ pub fn value(dice: &mut Dice, value: &Value) -> Value {
 }
 
 fn place(dice: &mut Dice, count: usize) -> usize {
-    // Mostly anywhere; but often near the root, where the keys are that matter.
+    // Often near the root, where the important keys are.
     if dice.below(2) == 0 { dice.below(count) } else { dice.below(count.min(60)) }
 }
 
-/// Changes a number or a text that is somewhere in a value.
+/// Changes one number, text or truth value in a value.
 fn gently(dice: &mut Dice, value: &mut Value) {
     let count = nodes(value);
     for _ in 0..100 {
@@ -149,7 +148,7 @@ fn nodes(value: &Value) -> usize {
     }
 }
 
-/// The node of a number, counted breadth first so that what is near the root has small ones.
+/// Returns the node of a number, counted breadth first, so that nodes near the root are first.
 fn node<'v>(root: &'v mut Value, number: &mut usize) -> &'v mut Value {
     let mut level = vec![root];
     loop {

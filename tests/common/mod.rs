@@ -1,4 +1,4 @@
-//! What several test programs share.
+//! Helpers that several test programs share.
 #![allow(dead_code, reason = "every test program uses its own part")]
 
 #[cfg(unix)]

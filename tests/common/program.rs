@@ -1,5 +1,4 @@
-//! Running the program itself, as a user does: in a folder of its own, with no settings from
-//! outside.
+//! Runs the program as users do: in its own folder, without settings from outside.
 
 use morphcog::store::run::RunFile;
 use std::collections::BTreeMap;
@@ -11,11 +10,11 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// Where the program is.
+/// Path of the program.
 pub const PROGRAM: &str = env!("CARGO_BIN_EXE_morphcog");
-/// No command of a test may take longer.
+/// Time limit of every command in a test.
 const LIMIT: Duration = Duration::from_secs(120);
-/// What the environment of the tests must not decide.
+/// Variables of the environment that must not affect tests.
 pub const SETTINGS: [&str; 9] = [
     "MORPHCOG_ATLAS",
     "MORPHCOG_DATA",
@@ -28,7 +27,7 @@ pub const SETTINGS: [&str; 9] = [
     "PBS_ARRAY_INDEX",
 ];
 
-/// A tiny run that still does everything: two digits, bodies of 5 × 5, a fifth of a second.
+/// A tiny run with all features: two digits, bodies of 5 × 5, a fifth of a second.
 pub const TINY: &str = r#"
 seed = 3
 generations = 12
@@ -56,8 +55,8 @@ initial = 8
 parents = 8
 "#;
 
-/// The other way to evolve: [`TINY`] with the response as fitness, half of the offspring changed in
-/// up to four voxels, the six fittest kept.
+/// Returns [`TINY`] evolved the other way: the response is the fitness, half of the offspring
+/// change in up to four voxels, and the six fittest stay.
 pub fn gaits() -> String {
     let data = TINY.replace("train_images = [0, 1]", "images_per_class = 4");
     format!(
@@ -66,7 +65,7 @@ pub fn gaits() -> String {
     )
 }
 
-/// What a command said and how it ended.
+/// Output and end of a command.
 #[derive(Debug)]
 pub struct Said {
     /// Exit code; `None` if a signal ended it.
@@ -76,8 +75,8 @@ pub struct Said {
 }
 
 impl Said {
-    /// Checks that it ended with this code; what is in `words` must be in what it said on stderr: files,
-    /// keys, numbers, ids, commands. How it is put is for the snapshots.
+    /// Checks that it ended with this code and that stderr has these files, keys, numbers, ids or
+    /// commands. Snapshots check the wording.
     #[track_caller]
     pub fn ended(self, code: i32, words: &[&str]) -> Self {
         assert_eq!(self.code, Some(code), "{self:#?}");
@@ -87,7 +86,7 @@ impl Said {
         self
     }
 
-    /// Every line of stdout as JSON.
+    /// Parses every line of stdout as JSON.
     #[track_caller]
     pub fn json_lines(&self) -> Vec<serde_json::Value> {
         let read = |line: &str| serde_json::from_str(line).unwrap_or_else(|e| panic!("{e} in: {line}"));
@@ -95,13 +94,13 @@ impl Said {
     }
 }
 
-/// A folder in which commands run; gone at the end.
+/// A folder in which commands run; dropping it deletes it.
 pub struct Sandbox(TempDir);
 
-/// What [`Sandbox::once`] copies.
+/// Files that [`Sandbox::once`] copies.
 pub type Made = BTreeMap<String, Vec<u8>>;
 
-/// All files below a folder by their paths from it.
+/// Reads all files below a folder, by relative path.
 fn tree(folder: &Path, prefix: &str) -> Made {
     let mut files = Made::new();
     for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
@@ -119,14 +118,14 @@ impl Sandbox {
         Sandbox(tempfile::tempdir().unwrap())
     }
 
-    /// A sandbox with [`TINY`] as `tiny.toml`.
+    /// Makes a sandbox with [`TINY`] as `tiny.toml`.
     pub fn tiny() -> Self {
         let sandbox = Sandbox::new();
         sandbox.write("tiny.toml", TINY);
         sandbox
     }
 
-    /// A sandbox as `make` leaves it. That happens once; every other one is a copy.
+    /// Returns a sandbox as `make` leaves it. It runs once; later sandboxes are copies.
     pub fn once(made: &OnceLock<Made>, make: impl FnOnce(&Sandbox)) -> Self {
         let files = made.get_or_init(|| {
             let sandbox = Sandbox::new();
@@ -138,7 +137,7 @@ impl Sandbox {
         sandbox
     }
 
-    /// Starts a run that does not end by itself, and writes checkpoints all the time.
+    /// Starts a run that does not end by itself and writes checkpoints all the time.
     pub fn endless(&self, out: &str) -> Child {
         self.write("long.toml", TINY.replace("generations = 12", "generations = 10000000"));
         self.start(&format!("evolve -q -c long.toml -o {out} --set checkpoint.seconds=0.1"))
@@ -159,7 +158,7 @@ impl Sandbox {
         std::fs::read_to_string(self.path(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
     }
 
-    /// The program, not yet started.
+    /// Returns the program, not yet started.
     pub fn command<A: AsRef<OsStr>>(&self, args: impl IntoIterator<Item = A>) -> Command {
         let mut command = Command::new(PROGRAM);
         command.current_dir(self.0.path()).args(args);
@@ -169,13 +168,13 @@ impl Sandbox {
         command
     }
 
-    /// Runs the program; arguments are separated by blanks.
+    /// Runs the program; blanks separate arguments.
     #[track_caller]
     pub fn run(&self, args: &str) -> Said {
         said(self.command(args.split_whitespace()))
     }
 
-    /// Starts the program in the background, stdout to be read; arguments are separated by blanks.
+    /// Starts the program in the background with stdout piped; blanks separate arguments.
     pub fn start(&self, args: &str) -> Child {
         let mut command = self.command(args.split_whitespace());
         command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
@@ -186,8 +185,8 @@ impl Sandbox {
     }
 }
 
-/// An IDX dataset of zeros and ones, in files whose paths begin with `prefix`: noise with a bar, of
-/// the first ones upright; `seed` decides which noise.
+/// Writes an IDX dataset of zeros and ones, in files whose paths begin with `prefix`: noise, of
+/// seed `seed`, with a bar, which is upright in zeros.
 pub fn write_images(sandbox: &Sandbox, prefix: &str, [height, width]: [usize; 2], seed: u8) {
     let header = |sizes: &[u32]| {
         let magic = [0, 0, 8, sizes.len() as u8];
@@ -208,7 +207,7 @@ pub fn write_images(sandbox: &Sandbox, prefix: &str, [height, width]: [usize; 2]
     }
 }
 
-/// Runs a command. Whatever it is asked, it must not panic.
+/// Runs a command, which must never panic.
 #[track_caller]
 pub fn said(command: Command) -> Said {
     said_of(command, "", LIMIT)
@@ -247,13 +246,13 @@ pub fn said_of(mut command: Command, input: &str, limit: Duration) -> Said {
     said
 }
 
-/// Says that a test was not made, past the harness, which keeps the output of passing tests to itself.
+/// Reports a skipped test past the harness, which hides the output of passing tests.
 #[allow(clippy::disallowed_methods)]
 pub fn skipped(why: &str) {
     std::io::stderr().write_all(format!("SKIPPED: {why}\n").as_bytes()).unwrap();
 }
 
-/// The folder with MNIST that `MORPHCOG_DATA` names; says that `what` is not tested if it names none.
+/// Returns the MNIST folder in `MORPHCOG_DATA`; without one, reports `what` as not tested.
 pub fn mnist(what: &str) -> Option<OsString> {
     let folder = std::env::var_os("MORPHCOG_DATA").filter(|folder| !folder.is_empty());
     if folder.is_none() {
@@ -262,15 +261,14 @@ pub fn mnist(what: &str) -> Option<OsString> {
     folder
 }
 
-/// Asks a program that was started to end, as Slurm does.
+/// Sends a started program the signal that Slurm sends before its time limit.
 pub fn terminate(child: &Child) {
     let sent = Command::new("kill").args(["-s", "USR1", &child.id().to_string()]).status();
     assert!(sent.unwrap().success());
 }
 
-/// Tells whether the tests run where a signal is ignored, as hangups are under `nohup` and interrupts
-/// in a shell's background: then so do the programs that they start, and a test of it has nothing to
-/// see.
+/// Returns true if tests run with a signal ignored, as hangups are under `nohup` and interrupts in
+/// a shell's background. Programs they start inherit this, so its test would see nothing.
 pub fn is_ignored(signal: u32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
@@ -282,7 +280,7 @@ pub fn is_ignored(signal: u32) -> bool {
     is
 }
 
-/// All files of a folder with their content, to compare.
+/// Reads all files of a folder, for comparison.
 pub fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let named = |path: PathBuf| {
@@ -291,13 +289,13 @@ pub fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     entries.map(named).collect()
 }
 
-/// `metrics.csv` without its last column, the only one that depends on the clock.
+/// Returns `metrics.csv` without its last column, the only one that depends on the clock.
 pub fn without_seconds(metrics: &str) -> Vec<String> {
     assert!(metrics.lines().next().is_some_and(|header| header.ends_with(",seconds")));
     metrics.lines().map(|line| line.rsplit_once(',').unwrap().0.to_string()).collect()
 }
 
-/// Runs of all pairs of three digits, in `pairs/`.
+/// Returns a sandbox with runs of all pairs of three digits, in `pairs/`.
 pub fn pairs() -> Sandbox {
     static PAIRS: OnceLock<Made> = OnceLock::new();
     Sandbox::once(&PAIRS, |sandbox| {

@@ -1,4 +1,4 @@
-//! `morphcog serve` in the background, and a client of its own for it: byte by byte what is sent.
+//! `morphcog serve` in the background, and a client that controls every byte it sends.
 
 use super::program::Sandbox;
 use serde_json::Value;
@@ -8,16 +8,15 @@ use std::process::Child;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// Nothing that is waited for may take longer.
+/// Time limit of every wait.
 const LIMIT: Duration = Duration::from_secs(30);
 
-/// A server that runs; ended at the latest when this goes.
+/// A running server; dropping it ends it.
 pub struct Server {
     child: Option<Child>,
     pub port: u16,
 }
 
-/// An answer.
 #[derive(Debug)]
 pub struct Answer {
     pub status: u16,
@@ -34,7 +33,7 @@ impl Answer {
 }
 
 impl Server {
-    /// Starts it on a free port; arguments are separated by blanks.
+    /// Starts it on a free port; blanks separate arguments.
     pub fn start(sandbox: &Sandbox, args: &str) -> Self {
         let mut child = sandbox.start(&format!("serve --no-open {args}"));
         let mut line = String::new();
@@ -55,10 +54,10 @@ impl Server {
         stream
     }
 
-    /// Sends what is given, as it is; reads the whole answer.
+    /// Sends these bytes as they are, and reads the whole answer.
     pub fn send(&self, request: impl AsRef<[u8]>) -> Answer {
         let mut stream = self.connect();
-        // What is refused early is not read to its end; the answer is there all the same.
+        // The server may refuse a request before its end, and still answers.
         let _ = stream.write_all(request.as_ref());
         let mut bytes = Vec::new();
         stream.read_to_end(&mut bytes).unwrap();
@@ -101,7 +100,7 @@ impl Server {
         self.post_text(path, &body.to_string())
     }
 
-    /// The events that answer a request, as they come; to drop them closes the connection.
+    /// Returns the events that answer a request, as they come; dropping them closes the connection.
     pub fn events(&self, path: &str, body: &Value) -> impl Iterator<Item = (String, Value)> + use<> {
         let mut stream = self.connect();
         stream.write_all(&self.posted(path, body.to_string().as_bytes())).unwrap();
@@ -120,7 +119,7 @@ impl Server {
         })
     }
 
-    /// Sends a signal; the server must end with 0, soon, and without a word of panic.
+    /// Sends a signal; the server must end with 0, soon, and without a panic.
     #[cfg(unix)]
     pub fn ended_by(mut self, signal: &str) {
         let mut child = self.child.take().unwrap();
@@ -140,8 +139,8 @@ impl Server {
     }
 }
 
-/// A proxy that has a server under a prefix of its own, as Jupyter's does: it cuts the prefix off and
-/// passes on everything else as it is.
+/// A proxy that puts a server under a prefix, as Jupyter's does: it removes the prefix and passes
+/// on all else unchanged.
 pub struct Proxy {
     pub port: u16,
     strays: Arc<Mutex<Vec<String>>>,
@@ -167,7 +166,7 @@ impl Proxy {
     fn pass_on(stream: TcpStream, to: u16, strays: &Mutex<Vec<String>>) {
         let mut from = BufReader::new(stream.try_clone().unwrap());
         let mut first = String::new();
-        // A browser opens connections that it then does not use.
+        // Browsers open connections that they then do not use.
         if from.read_line(&mut first).is_err() || first.is_empty() {
             return;
         }
@@ -189,7 +188,7 @@ impl Proxy {
         let _ = server.shutdown(Shutdown::Both);
     }
 
-    /// What was asked for outside of the prefix.
+    /// Returns requests for paths outside the prefix.
     pub fn strays(&self) -> Vec<String> {
         self.strays.lock().unwrap().clone()
     }

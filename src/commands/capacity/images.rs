@@ -1,4 +1,4 @@
-//! The images that networks are trained and tested on: those of the robots, seen as they see them.
+//! Images to train and test networks on: those of the robots, as the robots see them.
 
 use crate::base::Grid;
 use crate::base::error::Error;
@@ -19,13 +19,13 @@ use crate::task::grouping;
 use crate::task::grouping::Group;
 use std::path::{Path, PathBuf};
 
-/// The images networks learn from, wait on and are tested on, with their classes.
+/// The images that networks train on, wait on and are tested on, with their classes.
 pub(crate) struct Images {
-    /// By run.
+    /// Images of each run.
     training: Vec<Vec<Seen>>,
     waiting: Vec<Seen>,
     test: Vec<Seen>,
-    /// Of all of them, and how they are seen.
+    /// Hash of all images as they are seen.
     pub key: String,
 }
 
@@ -68,7 +68,7 @@ impl Images {
             report.runs.iter().map(|run| see(Split::Train, &run.training_images)).collect();
         let (training, test_images) = (training?, see(Split::Test, &report.images)?);
         let waiting = see(Split::Train, &waited)?;
-        // Pixels, not indices: what is learnt depends on those.
+        // Pixels, not indices, since training depends on the pixels.
         let all = training.iter().flatten().chain(&test_images).chain(&waiting);
         let pixels: Vec<(u8, &[f64])> = all.map(|seen| (seen.class, seen.stimulus.cells())).collect();
         let counts: Vec<usize> = training.iter().map(Vec::len).collect();
@@ -78,7 +78,7 @@ impl Images {
     }
 }
 
-/// Where the images are: a run beside the evaluation, or in a folder beside it, may know.
+/// Collects the whereabouts of the images from runs beside the evaluation or in folders there.
 fn whereabouts(options: &Options, session: &Session) -> Whereabouts {
     let folder = options.eval.parent().filter(|folder| !folder.as_os_str().is_empty());
     let entries = std::fs::read_dir(folder.unwrap_or(Path::new("."))).into_iter().flatten().flatten();
@@ -88,7 +88,7 @@ fn whereabouts(options: &Options, session: &Session) -> Whereabouts {
     runs.iter().fold(here, |whereabouts, run| whereabouts.and_of(run))
 }
 
-/// Images of the training split that no run was trained on last.
+/// Draws images of the training split that no run was trained on last.
 fn waiting(
     dataset: &Dataset,
     setting: &Setting,
@@ -146,11 +146,10 @@ impl Task {
         Ok(Task { kind, training: training?, waiting, test: samples(&images.test)? })
     }
 
-    /// The training of this number; the runs take turns in lending their images.
+    /// Trains the network of this number; the runs take turns in lending their images.
     ///
     /// # Errors
-    /// Of kind [`ErrorKind::Stopped`](crate::base::error::ErrorKind::Stopped) if `stop` is set
-    /// meanwhile.
+    /// Returns [`Stopped`](crate::base::error::ErrorKind::Stopped) if the session was stopped.
     pub fn train(
         &self,
         size: usize,

@@ -1,4 +1,4 @@
-//! The images that `eval` shows, and what takes no body on them.
+//! Images of `eval`, and the baselines on them that need no body.
 
 use crate::analysis::baselines::{Labelled, best_pixel, larger_group, nearest_training_image};
 use crate::base::Grid;
@@ -22,23 +22,23 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Training images per class on which the single-pixel baseline is chosen.
 const PIXEL_IMAGES_PER_CLASS: usize = 500;
 
-/// Test or validation images, and how robots see them.
+/// Test or validation images, as robots see them.
 pub(crate) struct HeldOutImages<'a> {
     config: &'a Config,
     dataset: &'a Dataset,
     options: &'a Options,
     /// The images.
     pub images: Vec<ImageRef>,
-    /// Of each, as all robots see it together.
+    /// Each image as all robots see it together.
     stimuli: Vec<Grid<f64>>,
 }
 
 impl<'a> HeldOutImages<'a> {
-    /// As many as asked for, evenly divided between the classes; the first classes get what is left
-    /// over. `config`: of the runs, with what their robots see together.
+    /// Draws images, evenly divided between the classes; the first classes get the remainder. The
+    /// robots of the runs see images together under `config`.
     ///
     /// # Errors
-    /// If there are not enough images, or not one of each class is asked for.
+    /// Returns an error if there are too few images, or fewer are requested than classes.
     pub fn draw(
         config: &'a Config,
         sources: &[StoredRun],
@@ -55,7 +55,7 @@ impl<'a> HeldOutImages<'a> {
             HeldOut::Test => held_out::test_images(&classes, dataset, asked, options.seed)?,
             HeldOut::Validation => {
                 let runs: Vec<_> = sources.iter().map(|source| &source.run).collect();
-                // Now, or before: those of `validation.json`.
+                // Images that choose robots now, or did before, as `validation.json` says.
                 let count = |source: &StoredRun| match options.robots.validated() {
                     Some(_) => Ok(Some(options.validation.unwrap_or(config.validation.images))),
                     None => shown_for_validation(source),
@@ -66,7 +66,7 @@ impl<'a> HeldOutImages<'a> {
         };
         let split = options.split.split();
         let stimuli = see_all(config, dataset, split, &images)?;
-        // What a run's robots cannot see is found before any is shown one, by every rank.
+        // Every rank refuses images that a run's robots cannot see, before the first rollout.
         if let Some(first) = images.first() {
             for source in sources {
                 see(&source.run.config, dataset, split, first.index)?;
@@ -75,10 +75,10 @@ impl<'a> HeldOutImages<'a> {
         Ok(HeldOutImages { config, dataset, options, images, stimuli })
     }
 
-    /// As robots of a run see them, in the order of the images.
+    /// Returns the images as robots of a run see them, in order.
     ///
     /// # Errors
-    /// If an image cannot be drawn or seen.
+    /// Returns an error if an image cannot be drawn or seen.
     pub fn seen_by(&self, config: &Config) -> Result<Cow<'_, [Grid<f64>]>, Error> {
         match config.stimulus == self.config.stimulus {
             true => Ok(Cow::Borrowed(&self.stimuli)),
@@ -86,10 +86,10 @@ impl<'a> HeldOutImages<'a> {
         }
     }
 
-    /// The baselines of each of these tasks, by the names that their robots' runs have for them.
+    /// Returns the baselines of these tasks, by the names that the runs give them.
     ///
     /// # Errors
-    /// If an image cannot be drawn or seen.
+    /// Returns an error if an image cannot be drawn or seen.
     pub fn baselines<'t>(
         &self,
         sources: &[StoredRun],
@@ -100,7 +100,7 @@ impl<'a> HeldOutImages<'a> {
             images.iter().map(|image| Ok((stimulus(image.index)?, image.label))).collect()
         };
         let choice = seen(&self.pixel_images()?)?;
-        // In another dataset, a run's training images are other ones.
+        // In another dataset, the indices of training images mean other images.
         let is_own = self.dataset.name() == self.config.data.dataset;
         let of_runs = sources.iter().map(|source| {
             let path = source.path.display().to_string();
@@ -119,7 +119,7 @@ impl<'a> HeldOutImages<'a> {
             }
             let rule = best_pixel(task, &labelled(&choice));
             let nearest_of_all = of_runs.as_ref().map(|all| {
-                // Of the runs that have the task.
+                // The mean over the runs that have the task.
                 let having = all.iter().filter(|(grouping, _)| grouping.tasks().contains(task));
                 let nearest = having.map(|(_, own)| nearest_training_image(task, &labelled(own), &shown));
                 let nearest: Vec<f64> = nearest.collect();
@@ -136,7 +136,7 @@ impl<'a> HeldOutImages<'a> {
         Ok(all)
     }
 
-    /// Training images to choose a single pixel by; none of those shown.
+    /// Draws training images to choose a single pixel by, without the evaluated ones.
     fn pixel_images(&self) -> Result<Vec<ImageRef>, Error> {
         let shown: BTreeSet<usize> = match self.options.split {
             HeldOut::Test => BTreeSet::new(),
@@ -154,8 +154,7 @@ impl<'a> HeldOutImages<'a> {
     }
 }
 
-/// The images that a run's robots were trained on: of a training, all that it learnt from, and not
-/// only the last, which stand in its file.
+/// Returns all images a run's robots were trained on; the file of a training has only the last.
 fn taught_with(run: &RunFile, dataset: &Dataset) -> Result<Vec<ImageRef>, Error> {
     match run.origin {
         Some(_) => Training::images(&run.config, dataset),
@@ -167,7 +166,7 @@ fn labelled(list: &[(Grid<f64>, u8)]) -> Vec<Labelled<'_>> {
     list.iter().map(|(stimulus, class)| Labelled { stimulus, class: *class }).collect()
 }
 
-/// Validation images that robots of each run are chosen by, as many of them as `count` says of each.
+/// Returns the validation images that choose the robots of each run, `count` per run.
 pub(crate) fn chosen_by(
     sources: &[StoredRun],
     dataset: &Dataset,

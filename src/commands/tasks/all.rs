@@ -1,4 +1,4 @@
-//! All tasks, several at once.
+//! Runs all tasks, several at once.
 
 use crate::base::error::{Error, ErrorKind};
 use crate::base::observer::{Generation, Observer, Work};
@@ -24,24 +24,24 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// How tasks ended.
+/// Summary of the tasks.
 #[derive(Clone, Debug, Default)]
 pub struct Summary {
-    /// Tasks that are done, now or before.
+    /// Number of tasks done, now or before.
     pub done: usize,
-    /// Numbers of the tasks that failed.
+    /// Numbers of the failed tasks.
     pub failed: Vec<usize>,
-    /// Tasks that other processes are at.
+    /// Number of tasks that other processes work on.
     pub elsewhere: usize,
-    /// Tasks that were stopped or did not begin.
+    /// Number of tasks that were stopped or did not begin.
     pub open: usize,
 }
 
-/// Whether there are images for tasks that have not begun, also for their tests: else they would
-/// fail, one after the other, or when hours of work are done.
+/// Checks that tasks that have not begun have images, also for their tests. Otherwise they would
+/// fail one by one, or after hours of work.
 ///
 /// # Errors
-/// If not.
+/// Returns an error if images are missing.
 pub fn check_data<'a>(
     tasks: impl Iterator<Item = (usize, &'a Task)>,
     place: &Place,
@@ -86,10 +86,7 @@ pub fn check_data<'a>(
     Ok(())
 }
 
-/// Whether there are so many test images; `key` says where they are asked for.
-///
-/// # Errors
-/// If not.
+/// Checks that there are enough test images; `key` names the setting that requests them.
 pub(crate) fn check_test(
     config: &Config,
     dataset: &Dataset,
@@ -100,10 +97,10 @@ pub(crate) fn check_test(
     drawn.map(|_| ()).map_err(|error| error.in_place(&format!("{key} = {images}")))
 }
 
-/// Does all tasks here, `jobs` at once; `None`: one per core. One that fails does not stop others.
+/// Runs all tasks, `jobs` at once; `None`: one per core. A failing task does not stop others.
 ///
 /// # Errors
-/// If the folder cannot be made, or there are no images.
+/// Returns an error if the folder cannot be made, or there are no images.
 pub fn run_all(
     tasks: &[Task],
     place: &Place,
@@ -135,7 +132,7 @@ pub fn run_all(
     let all = All { session, known, parts: numbered.iter().map(|_| AtomicU64::new(0)).collect() };
     let next = AtomicUsize::new(0);
     let summary = Mutex::new(Summary { done: before, ..Summary::default() });
-    // Tasks that other processes were at.
+    // Tasks that other processes worked on.
     let elsewhere: Mutex<Vec<&Task>> = Mutex::new(Vec::new());
     let worker = || {
         while session.check().is_ok() {
@@ -185,27 +182,27 @@ pub fn run_all(
     Ok(summary)
 }
 
-/// One progress over all tasks.
+/// Progress over all tasks.
 struct All<'o> {
     session: &'o Session<'o>,
     /// Generations of tasks that were done before.
     known: u64,
-    /// Generations done of each other task.
+    /// Generations done in each other task.
     parts: Vec<AtomicU64>,
 }
 
-/// A task's part in it.
+/// A task's part of the progress.
 struct Part<'a, 'o> {
     all: &'a All<'o>,
     index: usize,
     amount: u64,
     name: &'a str,
-    /// Whether it has said how many generations were done before.
+    /// True once it has reported the generations done before.
     has_begun: AtomicBool,
 }
 
 impl Part<'_, '_> {
-    /// So much was done before it began here, if it has not said so yet.
+    /// Reports the work done before it began here, unless it has done so.
     fn begins_at(&self, done: u64) {
         if !self.has_begun.swap(true, Ordering::Relaxed) {
             self.all.session.observer.skips(done.min(self.amount));

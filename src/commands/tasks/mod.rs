@@ -1,7 +1,6 @@
-//! Independent tasks, each in a run folder of its own: what `sweep` and `reproduce` are made of.
-//!
-//! A task evolves or trains, and then does the steps that its plan asks for. How far it is stands
-//! in its folder, so that any process on any machine goes on with it.
+//! Independent tasks of `sweep` and `reproduce`, each in its own run folder. A task evolves or
+//! trains, then does the steps of its plan. Its folder records its state, so that any process on
+//! any machine can go on with it.
 
 pub mod all;
 pub mod status;

@@ -1,4 +1,4 @@
-//! How far tasks are, read from their folders.
+//! Status of tasks, read from their folders.
 
 use crate::base::error::Error;
 use crate::base::files::open_file;
@@ -14,36 +14,36 @@ use std::path::{Path, PathBuf};
 /// Bytes at the end of a metrics.csv that hold its last whole row; rows have about 150.
 const ROW: u64 = 4096;
 
-/// How far a task is, as its folder says.
+/// Status of a task, as its folder says.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Status {
     /// Its number, from 1.
     pub task: usize,
     /// Its name.
     pub name: String,
-    /// How far it is.
+    /// Its state.
     pub state: State,
-    /// Generations done, of how many; none for a training.
+    /// Generations done and requested; `None` for a training.
     pub generations: Option<[u64; 2]>,
-    /// Wall-clock time so far \[s\]; of a running task, that of its run as far as it is written.
+    /// Wall-clock time so far \[s\]; for a running task, as far as its run has written it.
     pub seconds: Option<f64>,
-    /// Time it will probably take still \[s\], as far as that is known.
+    /// Estimated time left \[s\], if known.
     pub seconds_left: Option<f64>,
-    /// What it failed with, or who is at it.
+    /// Its error, or the process that works on it.
     pub about: Option<String>,
 }
 
-/// How far all tasks are.
+/// Returns the status of all tasks.
 ///
 /// # Errors
-/// If a folder cannot be read.
+/// Returns an error if a folder cannot be read.
 pub fn status(tasks: &[Task], place: &Place) -> Result<Vec<Status>, Error> {
     let locks: Vec<PathBuf> = tasks.iter().map(|task| place.folder(task).join(TASK_LOCK)).collect();
     let mut all = Vec::new();
     for ((number, task), held) in (1..).zip(tasks).zip(lock::states(&locks)) {
         all.push(status_of(number, task, place, held)?);
     }
-    // A task of which nothing else is known takes as long as those that are done.
+    // A task about which nothing else is known takes as long as the finished ones.
     let done: Vec<f64> = all.iter().filter(|s| s.state == State::Done).filter_map(|s| s.seconds).collect();
     let mean = (!done.is_empty()).then(|| done.iter().sum::<f64>() / done.len() as f64);
     for status in all.iter_mut().filter(|s| s.state != State::Done && s.seconds_left.is_none()) {
@@ -88,8 +88,8 @@ fn status_of(number: usize, task: &Task, place: &Place, held: lock::State) -> Re
     Ok(Status { task: number, name: task.name.clone(), state, generations, seconds, seconds_left, about })
 }
 
-/// Generations that a metrics.csv has, and the wall-clock time they took \[s\]. Only the end of the
-/// file is read: a long run's has megabytes.
+/// Reads generations and wall-clock time \[s\] at the end of a metrics.csv, which may have
+/// megabytes.
 fn last_generation(path: &Path) -> Option<(u64, f64)> {
     let mut file = open_file(path).ok()?;
     let length = file.metadata().ok()?.len();

@@ -1,4 +1,4 @@
-//! One task: its run, then its steps, as far as they are not done.
+//! Runs one task: its run, then its steps, unless they are done.
 
 use crate::base::error::{Error, ErrorKind};
 use crate::base::remedy::Remedy;
@@ -16,10 +16,10 @@ use crate::task::direction;
 use crate::training;
 use std::time::Instant;
 
-/// Does a task, or goes on with it.
+/// Runs a task, or goes on with it.
 ///
 /// # Errors
-/// Why it failed; that it was stopped; that another process is at it.
+/// Returns an error if it failed or was stopped, or another process works on it.
 pub fn run(task: &Task, place: &Place, session: &Session) -> Result<(), Error> {
     let folder = place.folder(task);
     std::fs::create_dir_all(&folder).map_err(|error| Error::writing(&folder, &error))?;
@@ -45,23 +45,22 @@ pub fn run(task: &Task, place: &Place, session: &Session) -> Result<(), Error> {
         Err(error) if error.kind == ErrorKind::Stopped => (State::Stopped, None),
         Err(error) => (State::Failed, Some(error.to_string())),
     };
-    // Why it ended says more than that this could not be written down.
+    // The reason it ended says more than a failure to record it.
     let written = file.write(&path);
     ended.and(written)
 }
 
-/// Whether all of a task is done, as its file says, and still there. More generations, or other
-/// steps, are still to do.
+/// Returns true if a task is done, by the present plan, and its results are still there.
 pub(super) fn is_done(known: Option<&TaskFile>, task: &Task, place: &Place) -> bool {
     known.is_some_and(|known| was_done(known, task)) && lacking(task, place).is_none()
 }
 
-/// Whether a task's file says that all of it is done.
+/// Returns true if a task's file says that all of it is done.
 pub(super) fn was_done(known: &TaskFile, task: &Task) -> bool {
     known.state == State::Done && known.settings == task.settings() && known.asked == task.asked()
 }
 
-/// What of a task that was done is not there any more, or not its own: why it is to be done again.
+/// Returns the part of a finished task that is missing or not its own: the reason to redo it.
 pub(super) fn lacking(task: &Task, place: &Place) -> Option<String> {
     let folder = place.folder(task);
     let audit = task.steps.audit.as_ref().map(|_| AUDIT_JSON);
@@ -81,10 +80,10 @@ pub(super) fn lacking(task: &Task, place: &Place) -> Option<String> {
     }
 }
 
-/// The test that a task's plan asks for, if it does.
+/// Returns the test that a task's plan requests, if any.
 ///
 /// # Errors
-/// If its selection of robots cannot be read.
+/// Returns an error if its selection of robots cannot be read.
 pub(crate) fn test_of(task: &Task, place: &Place) -> Result<Option<eval::Options>, Error> {
     let Some(step) = &task.steps.eval else { return Ok(None) };
     let folder = place.folder(task);
@@ -102,7 +101,7 @@ pub(crate) fn test_of(task: &Task, place: &Place) -> Result<Option<eval::Options
     }))
 }
 
-/// The run, and the steps after it. What was done before is not done again.
+/// Does the run and the steps after it, unless they are done.
 fn steps(task: &Task, place: &Place, session: &Session) -> Result<(), Error> {
     let folder = place.folder(task);
     let stopped =
@@ -175,8 +174,8 @@ fn steps(task: &Task, place: &Place, session: &Session) -> Result<(), Error> {
     Ok(())
 }
 
-/// What a task can do about an error of its run: it always resumes, so that a run that cannot be resumed
-/// is another one, which is in the way.
+/// Adapts the remedies of a run's error. A task always resumes, so a run that cannot be resumed is
+/// another one, in the way.
 fn of_task(error: Error) -> Error {
     let is_in_the_way = error.remedies.iter().any(|remedy| match remedy {
         Remedy::Resume | Remedy::Replace => true,
@@ -192,7 +191,7 @@ fn of_task(error: Error) -> Error {
     Error { remedies: error.remedies.into_iter().map(by_itself).collect(), ..error }
 }
 
-/// What later steps read from its file, which must be there.
+/// Returns a result that later steps read from its file, or the error of writing it.
 pub(crate) fn written<T>(found: T, unwritten: Option<Error>) -> Result<T, Error> {
     match unwritten {
         None => Ok(found),

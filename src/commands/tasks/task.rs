@@ -1,4 +1,4 @@
-//! What a task is: what makes its run, and what is done with that.
+//! [`Task`]: a run, and the steps after it.
 
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
@@ -17,20 +17,20 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-/// A task.
+/// A task of a sweep or a reproduction.
 #[derive(Clone, Debug)]
 pub struct Task {
-    /// Its name, which is its run folder's, too.
+    /// Its name, which its run folder shares.
     pub name: String,
-    /// What makes its run.
+    /// Its run.
     pub run: Run,
-    /// What is done with that.
+    /// Steps after the run.
     pub steps: Steps,
-    /// Keys that are not the same in all tasks, with their values as text; for tables.
+    /// Keys that differ between tasks, with their values as text, for tables.
     pub varied: Vec<(String, String)>,
 }
 
-/// What makes a run.
+/// The run of a task.
 #[derive(Clone, Debug)]
 pub enum Run {
     /// `evolve`, with the name of the run, and the groups of classes if the plan names them.
@@ -40,7 +40,7 @@ pub enum Run {
 }
 
 impl Run {
-    /// The config that the run has.
+    /// Returns the config of the run.
     pub(crate) fn config(&self) -> &Config {
         match self {
             Run::Evolve(config, ..) => config,
@@ -48,7 +48,7 @@ impl Run {
         }
     }
 
-    /// The groups of classes that the plan names.
+    /// Returns the groups of classes that the plan names.
     pub(super) fn groups(&self) -> Option<&Groups> {
         match self {
             Run::Evolve(.., groups) => groups.as_ref(),
@@ -60,23 +60,23 @@ impl Run {
 /// A training.
 #[derive(Clone, Debug)]
 pub struct Training {
-    /// The run.json whose robots walk.
+    /// The run.json whose robots are trained.
     pub archive: PathBuf,
-    /// SHA-256 of that.
+    /// SHA-256 of this file.
     pub sha256: String,
-    /// Which of its robots.
+    /// Its robots to train.
     pub robots: String,
     /// The two groups of classes.
     pub groups: Groups,
-    /// Seed of all chance.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// Keys that differ from those of the run.
     pub set: Vec<String>,
-    /// The config that results.
+    /// The resulting config.
     pub config: Config,
 }
 
-/// What is done after a run.
+/// Steps after a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Steps {
@@ -92,9 +92,9 @@ pub struct Steps {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct AuditStep {
-    /// Which robots, as `--robots` of `morphcog audit`. Default "all".
+    /// Robots to audit, as with `--robots` of `morphcog audit`. Default "all".
     pub robots: String,
-    /// How they are judged.
+    /// Criteria of the verdicts.
     pub criteria: Criteria,
 }
 
@@ -108,13 +108,13 @@ impl Default for AuditStep {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct EvalStep {
-    /// Which robots, as `--robots` of `morphcog eval`. Default "best".
+    /// Robots to test, as with `--robots` of `morphcog eval`. Default "best".
     pub robots: String,
-    /// Images in all, evenly divided between the classes, or "all" that there are. Default 1000.
+    /// Total number of images, evenly divided between the classes, or "all". Default 1000.
     pub images: HowMany,
-    /// Which images. Default "test".
+    /// Split of the images. Default "test".
     pub split: HeldOut,
-    /// Only robots that the audit found physical. Default false.
+    /// True to test only robots that the audit found physical. Default false.
     pub physical_only: bool,
 }
 
@@ -130,10 +130,7 @@ impl Default for EvalStep {
 }
 
 impl Steps {
-    /// Checks what a type cannot; `trains`: of tasks that train, not evolve.
-    ///
-    /// # Errors
-    /// What is wrong.
+    /// Checks what the types cannot; `trains` is true for tasks that train instead of evolve.
     pub(crate) fn check(&self, trains: bool) -> Result<(), Error> {
         if let Some(step) = &self.audit {
             selection("audit.robots", &step.robots)?;
@@ -147,7 +144,7 @@ impl Steps {
                 false => Ok(()),
             };
         };
-        // A training has one robot, whichever way it is chosen.
+        // A training has one robot, however it is chosen.
         let is_whole = trains || selection("audit.robots", &audit.robots)? == Selection::All;
         let is_named = matches!(&tested, Selection::Ids(ids) if !ids.iter().any(|id| id == BEST));
         if !is_whole && tested.validated().is_none() && !is_named {
@@ -159,27 +156,27 @@ impl Steps {
     }
 }
 
-/// Reads a selection of robots.
+/// Parses a selection of robots; errors mention `key`.
 pub(crate) fn selection(key: &str, text: &str) -> Result<Selection, Error> {
     text.parse().map_err(|error: String| Error::at_key(key, error))
 }
 
-/// Where tasks are done, and with what.
+/// The place where tasks are done.
 #[derive(Clone, Debug)]
 pub struct Place {
-    /// The folder that all run folders lie in.
+    /// Parent of all run folders.
     pub out: PathBuf,
 }
 
 impl Place {
-    /// The run folder of a task.
+    /// Returns the run folder of a task.
     pub(crate) fn folder(&self, task: &Task) -> PathBuf {
         self.out.join(&task.name)
     }
 }
 
 impl Task {
-    /// Everything that its run depends on.
+    /// Returns everything that its run depends on.
     pub(super) fn settings(&self) -> Settings {
         let (config, more) = match &self.run {
             Run::Evolve(config, ..) => (config.settings(), Vec::new()),
@@ -192,7 +189,7 @@ impl Task {
         config.chain(more.into_iter().map(|(key, value)| (key.to_string(), value.into()))).collect()
     }
 
-    /// Control steps of an actuation cycle.
+    /// Returns the control steps per actuation cycle.
     pub(crate) fn cycle_steps(&self) -> u32 {
         match &self.run {
             Run::Evolve(config, ..) => config.physics.cycle_steps,
@@ -200,18 +197,18 @@ impl Task {
         }
     }
 
-    /// What is asked for beyond that: it may grow or change, and the task goes on.
+    /// Returns the remaining requests, which may grow or change while the task goes on.
     pub(super) fn asked(&self) -> Value {
         let validation = &self.run.config().validation;
         serde_json::json!({ "amount": self.amount(), "validation": validation, "steps": self.steps })
     }
 
-    /// In which keys a run in its folder is another than this task makes: the key, its value there,
-    /// and in the plan.
+    /// Returns the keys in which a run in its folder differs, with the values there and in the
+    /// plan.
     pub(crate) fn differing(&self, run: &RunFile) -> Vec<(String, String, String)> {
         match &self.run {
             Run::Evolve(config, ..) => differing(&run.config.settings(), &config.settings()),
-            // Of a training's config windows and numbers of images are found on the way.
+            // A training finds its windows and numbers of images on the way.
             Run::Train(training) => {
                 let of = |config: &Config, archive: String| -> Settings {
                     let all = config.settings().into_iter();
@@ -224,8 +221,7 @@ impl Task {
         }
     }
 
-    /// The folder that its images are looked for in if no other is named, if it is there: one that
-    /// depends on the present folder.
+    /// Returns the default folder of its images if it exists; it depends on the working folder.
     pub fn data_here(&self) -> Option<PathBuf> {
         let (data, whereabouts) = match &self.run {
             Run::Evolve(config, ..) => (&config.data, Whereabouts::given(None)),
@@ -236,13 +232,13 @@ impl Task {
         whereabouts.by_default(data)
     }
 
-    /// The folder of the atlas that its gaits are from, if they are.
+    /// Returns the folder of the atlas that its gaits are from, if any.
     pub fn atlas(&self) -> Option<PathBuf> {
         let Run::Train(training) = &self.run else { return None };
         shipped::atlas_of(&training.archive)
     }
 
-    /// How much of it there is to show on a bar: generations, or challengers.
+    /// Returns its amount of work for a progress bar: generations, or challengers.
     pub(super) fn amount(&self) -> u64 {
         match &self.run {
             Run::Evolve(config, ..) => config.generations,
@@ -254,7 +250,7 @@ impl Task {
 /// Refuses tasks whose folders hold runs of other settings, all at once.
 ///
 /// # Errors
-/// Which, and the keys in which they differ.
+/// Returns an error for each of them, with the keys that differ.
 pub fn check_folders(tasks: &[Task], place: &Place) -> Result<(), Vec<Error>> {
     let check = |(number, task): (usize, &Task)| {
         let path = place.folder(task).join(TASK_JSON);
@@ -272,7 +268,7 @@ pub fn check_folders(tasks: &[Task], place: &Place) -> Result<(), Vec<Error>> {
     if refused.is_empty() { Ok(()) } else { Err(refused) }
 }
 
-/// That there is another run in a folder than its task makes, with the keys in which it differs.
+/// Returns the error for a folder with another run than its task's, with the keys that differ.
 pub(crate) fn another(folder: &Path, keys: &[(String, String, String)]) -> Error {
     let said =
         |(key, there, now): &(String, String, String)| format!("{key} = {there} there, {now} in the plan");
