@@ -9,6 +9,7 @@ use crate::commands::replay::{Found, Options};
 use crate::draw::error::write_whole;
 use crate::draw::plot;
 use crate::draw::plot::{Background, Figure, PRINT};
+use crate::robots::published;
 use crate::search::one_by_one::Named;
 use crate::shipped::exists;
 use crate::store::capacity::CapacityFile;
@@ -272,7 +273,11 @@ fn too_short(path: &Path, run: &RunFile, generations: usize) -> Error {
 /// `plot-<kind>[-robot]` beside a run.json.
 fn stem(archive: &Path, kind: Kind, robot: &str) -> PathBuf {
     let name = if robot.is_empty() { format!("plot-{kind}") } else { format!("plot-{kind}-{robot}") };
-    folder::beside(archive, &name)
+    // Published robots have names by which their files are known.
+    match archive == published::archive() {
+        true => PathBuf::from(name),
+        false => folder::beside(archive, &name),
+    }
 }
 
 fn of_robot(wanted: &Wanted, named: &Named) -> Result<Made, Error> {

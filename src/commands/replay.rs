@@ -123,12 +123,17 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
         config.data = config.data.of(dataset);
     }
     let whereabouts = Whereabouts::given(options.data.as_deref()).and_of(&found.archive);
+    // Any body can look at the digits that the program draws.
+    let offer = |error: Error| match options.dataset {
+        None => error.remedy(Remedy::UseBuiltin),
+        Some(_) => error,
+    };
     let (asks, mut shown) = (!options.images.is_empty(), options.images.clone());
     if shown.is_empty() {
         let own = if options.dataset.is_none() { found.training.as_slice() } else { &[] };
         let all = match own {
             [] => {
-                let train = whereabouts.load(&config.data, &[Split::Train])?;
+                let train = whereabouts.load(&config.data, &[Split::Train]).map_err(offer)?;
                 // Draws no more than are recorded: another dataset may have fewer.
                 let is_shown = |per_class: &usize| per_class * config.classes().len() <= MAX_IMAGES;
                 let images_per_class = Some(config.data.images_per_class).filter(is_shown).unwrap_or(1);
@@ -147,7 +152,7 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
     let wanted: Vec<Split> =
         Split::ALL.into_iter().filter(|split| shown.iter().any(|image| image.split == *split)).collect();
     let own = found.dataset.as_ref().filter(|own| own.name == config.data.dataset);
-    let dataset = load_dataset_of(own, config, &whereabouts, &wanted)?;
+    let dataset = load_dataset_of(own, config, &whereabouts, &wanted).map_err(offer)?;
     let mut images = Vec::new();
     for Shown { split, index } in shown {
         let label = dataset.label(split, index).map_err(|error| match (&options.archive, asks) {

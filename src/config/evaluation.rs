@@ -9,7 +9,7 @@ use crate::task::protocol::RolloutMode;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How robots are evaluated: section `[evaluation]`.
+/// The evaluation of robots: section `[evaluation]`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct EvaluationConfig {

@@ -381,8 +381,7 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// How a robot is to be evaluated, for which `body` is simulated; `parent` is the cell of its
-    /// parent.
+    /// Makes the job that evaluates a robot by simulating `body`; `parent` is the cell of its parent.
     fn job<'b>(
         &'b self,
         parent: Option<usize>,

@@ -398,7 +398,7 @@ impl StoredRun {
         Ok(StoredRun { path: path.to_path_buf(), run: RunFile::read(path)? })
     }
 
-    /// Whether its robots tell images apart.
+    /// Checks that its robots have a task.
     ///
     /// # Errors
     /// If they are gaits, which have no task yet; what teaches them one.

@@ -9,7 +9,7 @@ use crate::task::perturbation::Condition;
 use crate::task::score::Answer;
 use std::borrow::Cow;
 
-/// What evolution maximises: which body is simulated for a candidate, under which images, and what
+/// The objective of evolution: which body is simulated for a candidate, under which images, and what
 /// its fitness counts. The loop of MAP-Elites is the same for all of them.
 pub trait Objective: Sync {
     /// Returns the images and conditions of a run's evaluations, given its training images as

@@ -242,7 +242,7 @@ fn what_cannot_be_audited_is_refused_with_what_to_do() {
     sandbox.write("own.toml", "threshold = -1\n");
     audit("--criteria own.toml").ended(3, &["threshold"]);
     sandbox.run("audit --archive none.json").ended(3, &["none.json"]);
-    sandbox.run("replay --robot XFJPI --physical-only").ended(2, &["--physical-only"]);
+    sandbox.run("replay --robot XFJPI --physical-only").ended(3, &["audit --archive gallery:"]);
 }
 
 /// Stops an audit when it is half done.

@@ -153,7 +153,7 @@ fn what_cannot_be_compared_is_refused() {
     sandbox.run("capacity --eval runless.json").ended(3, &["runless.json: runs"]);
     let published = sandbox.read("runs/eval.json").replace("\"name\":\"tiny\"", "\"name\":\"gallery\"");
     sandbox.write("gallery.json", published);
-    sandbox.run("capacity --eval gallery.json --physical-only").ended(2, &["--physical-only"]);
+    sandbox.run("capacity --eval gallery.json --physical-only").ended(3, &["morphcog audit"]);
     sandbox.run("capacity --eval runs/3/run.json").ended(3, &["morphcog-eval"]);
     sandbox.run("capacity --eval nowhere.json").ended(3, &["nowhere.json", "morphcog eval"]);
 }

@@ -328,7 +328,7 @@ fn what_cannot_be_measured_is_one_clear_error_and_writes_nothing() {
     refused(&to_walker("--task 3|10,11"), 3, &["--task", "class 10"]);
     refused("--robots nobody", 3, &["nobody"]);
     sandbox.run("response --robots YJTLA --task 0|1").ended(3, &["mnist", "data fetch"]);
-    sandbox.run("response --robots YJTLA --physical-only").ended(2, &["--physical-only"]);
+    sandbox.run("response --robots YJTLA --physical-only").ended(3, &["audit --archive gallery:"]);
     // Where nearly every rollout is unstable.
     let text = sandbox.read("run/run.json");
     let unstable = text.replace("\"blow_up_extent\":10.0", "\"blow_up_extent\":0.12");

@@ -11,9 +11,11 @@ use crate::common::server;
 use morphcog::base::error::{Error, ErrorKind};
 use morphcog::base::hash::sha256_hex;
 use morphcog::base::session::Session;
+use morphcog::base::stop::NEVER;
 use morphcog::base::text::is_unseen;
 use morphcog::cli::explain::explain;
 use morphcog::cli::output::console::{Console, Mode};
+use morphcog::cli::output::reporters::Reporter;
 use morphcog::commands::plot::{self, Kind, Wanted};
 use morphcog::commands::simulate::{Scenario, simulate};
 use morphcog::commands::{eval, replay};
@@ -222,6 +224,7 @@ impl World {
     fn plot(&self, case: &mut Case, kind: Kind, archive: &Path, name: &str) {
         let (out, err) = (Page::default(), Page::default());
         let console = Console::with_writers(Mode::Human, Box::new(out.clone()), Box::new(err.clone()));
+        let reporter = Reporter::new(&console);
         let wanted = Wanted {
             kind,
             archives: vec![archive.to_path_buf()],
@@ -232,7 +235,7 @@ impl World {
             dpi: Some(36),
             background: Background::Paper,
         };
-        case.check(plot::plot(&wanted, &Session::default()), name);
+        case.check(plot::plot(&wanted, &Session::new(&NEVER, &reporter)), name);
         for page in [out, err] {
             let text = String::from_utf8(page.0.lock().unwrap().clone()).unwrap();
             assert!(text.chars().all(|c| c == '\n' || !is_unseen(c)), "not harmless: {text:?}");
