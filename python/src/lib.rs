@@ -28,7 +28,7 @@ use morphcog::store::folder::{self, IfExists};
 use morphcog::store::images::HeldOut;
 use morphcog::store::names::AUDIT_JSON;
 use morphcog::store::run::RunFile;
-use morphcog::task::direction;
+use morphcog::task::answer;
 use morphcog::task::evaluation::fresh_rollouts;
 use morphcog::task::protocol::{MAX_ROW, MAX_STEPS, Protocol, RolloutMode};
 use morphcog::task::stimulus::stimulus;
@@ -450,7 +450,7 @@ impl RunData {
             split,
             validation: None,
             seed: 1,
-            threshold: direction::THRESHOLD,
+            threshold: answer::THRESHOLD,
             cycles: held_out_run::CYCLES,
             dataset: None,
             out: folder::beside(&self.place, eval::own_name(split)),

@@ -3,7 +3,7 @@
 use crate::base::number;
 use crate::config::audit::Criteria;
 use crate::store::audit::{PerturbedRollout, Verdict};
-use crate::task::direction::{Assignment, Direction};
+use crate::task::answer::{Assignment, Direction};
 use crate::task::fitness::Fitness;
 use crate::task::grouping::{Group, Split};
 use crate::task::perturbation::Kind;

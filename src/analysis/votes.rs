@@ -1,11 +1,12 @@
 //! Combines robots for two groups of classes into one classifier, without trained weights.
 
-use crate::base::error::Error;
-use crate::base::ranges;
 use crate::base::statistics::wilson;
-use crate::task::judge::Judge;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use crate::search::held_out_run::Trial;
+use crate::store::images::ImageRef;
+use crate::store::team::{Accuracy, Answers, Decoded, Member, TeamFile};
+use crate::task::answer::{Assignment, Direction, Readout, is_correct};
+use crate::task::grouping::Group;
+use serde::Serialize;
 
 /// Largest displacement that counts in a sum of walks \[voxel lengths\].
 pub const CLIP: f64 = 10.0;
@@ -26,7 +27,7 @@ impl Ballot {
     /// `threshold` gives no vote; one longer than `clip` counts as `clip`.
     pub fn count<'a>(
         classes: &[u8],
-        walks: impl IntoIterator<Item = (&'a Judge, Option<f64>)>,
+        walks: impl IntoIterator<Item = (&'a Readout, Option<f64>)>,
         threshold: f64,
         clip: f64,
     ) -> Self {
@@ -90,7 +91,7 @@ impl Tally {
     /// Counts walks; threshold and clip are those of [`Ballot::count`].
     pub fn of(
         classes: &[u8],
-        judges: &[&Judge],
+        judges: &[&Readout],
         moved: Vec<Option<f64>>,
         (threshold, clip): (f64, f64),
     ) -> Self {
@@ -102,31 +103,7 @@ impl Tally {
     }
 }
 
-/// The accuracy on some images.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Accuracy {
-    /// Images answered correctly.
-    pub right: usize,
-    /// Fraction answered correctly.
-    #[serde(deserialize_with = "ranges::share")]
-    pub accuracy: f64,
-    /// Its 95 % Wilson interval.
-    #[serde(deserialize_with = "ranges::interval")]
-    pub interval: [f64; 2],
-}
-
 impl Accuracy {
-    /// Checks that it covers at most this many images.
-    ///
-    /// # Errors
-    /// If more are correct, the error names the key.
-    pub(crate) fn check(&self, images: usize) -> Result<(), Error> {
-        match self.right <= images {
-            true => Ok(()),
-            false => Err(Error::at_key("right", format!("expected at most {images}, found {}", self.right))),
-        }
-    }
-
     /// Computes the accuracy from pairs of an answer and the correct one.
     pub fn of<T: PartialEq>(answers: impl IntoIterator<Item = (T, T)>) -> Self {
         let (mut right, mut all) = (0, 0);
@@ -138,15 +115,114 @@ impl Accuracy {
     }
 }
 
+impl Member {
+    /// Creates a member from a run's robot and its displacements, with its accuracy.
+    pub(crate) fn new(trial: &Trial, run_sha256: &str, displacements: Vec<Option<f64>>) -> Self {
+        let Trial { run, robot, split, images, threshold } = *trial;
+        let assignment = Assignment::from_training(split, run.fitness(), &run.answers(robot));
+        let is_right = |(image, walk): (&ImageRef, &Option<f64>)| {
+            is_correct(split, assignment, image.label, *walk, threshold)
+        };
+        let own = images.iter().zip(&displacements).filter_map(is_right).map(|is_right| (is_right, true));
+        let own = Accuracy::of(own);
+        let is_still = |walk: &&Option<f64>| walk.is_none_or(|walk| Direction::of(walk, threshold).is_none());
+        let still = displacements.iter().filter(is_still).count();
+        Member {
+            id: robot.id.clone(),
+            run: run.name.clone(),
+            run_sha256: run_sha256.to_string(),
+            task: robot.task.clone(),
+            groups: [Group::A, Group::B].map(|group| split.classes(group).to_vec()),
+            first_group_walks: assignment.expected(Group::A).name().to_string(),
+            body: robot.body.clone(),
+            own,
+            not_moved: still as f64 / images.len().max(1) as f64,
+            displacements,
+        }
+    }
+}
+
+impl Decoded {
+    fn new(classes: &[u8], images: &[ImageRef], places: &[usize]) -> Self {
+        let place_of = |class: u8| classes.iter().position(|other| *other == class).unwrap_or(0);
+        let mut confusion = vec![vec![0; classes.len()]; classes.len()];
+        for (image, answer) in images.iter().zip(places) {
+            confusion[place_of(image.label)][*answer] += 1;
+        }
+        let share = |(place, class): (usize, &u8)| {
+            let all: usize = confusion[place].iter().sum();
+            (*class, confusion[place][place] as f64 / all.max(1) as f64)
+        };
+        let answers: Vec<u8> = places.iter().map(|place| classes[*place]).collect();
+        Decoded {
+            accuracy: Accuracy::of(answers.iter().copied().zip(images.iter().map(|image| image.label))),
+            per_class: classes.iter().enumerate().map(share).collect(),
+            confusion,
+            answers,
+        }
+    }
+}
+
+impl TeamFile {
+    /// Counts the votes of all walks under an image.
+    fn ballot(&self, sides: &[Readout], image: usize) -> Ballot {
+        let walks =
+            sides.iter().zip(&self.members).map(|(sides, member)| (sides, member.displacements[image]));
+        Ballot::count(&self.classes, walks, self.threshold, self.clip)
+    }
+
+    /// Returns the members' joint answers to all images.
+    pub(crate) fn decided(&self) -> Answers {
+        let sides: Vec<Readout> = self.members.iter().map(Member::judge).collect();
+        let ballots: Vec<Ballot> = (0..self.images.len()).map(|image| self.ballot(&sides, image)).collect();
+        let knows = |class: &u8| {
+            sides.iter().filter(|sides| sides.left.contains(class) || sides.right.contains(class)).count()
+        };
+        let known: Vec<usize> = self.classes.iter().map(knows).collect();
+        let by_votes: Vec<(usize, bool)> = ballots.iter().map(Ballot::by_votes).collect();
+        let by_walks: Vec<usize> = ballots.iter().map(Ballot::by_walks).collect();
+        let places: Vec<usize> = by_votes.iter().map(|(place, _)| *place).collect();
+        let count = self.images.len().max(1) as f64;
+        let agreement = ballots.iter().zip(&places);
+        let agreement =
+            agreement.map(|(ballot, place)| ballot.votes[*place] as f64 / known[*place].max(1) as f64);
+        Answers {
+            votes: Decoded::new(&self.classes, &self.images, &places),
+            walks: Decoded::new(&self.classes, &self.images, &by_walks),
+            ties: by_votes.iter().filter(|(_, tied)| *tied).count() as f64 / count,
+            agreement: agreement.sum::<f64>() / count,
+            not_moved: ballots.iter().map(|ballot| ballot.silent as f64).sum::<f64>() / count,
+        }
+    }
+
+    /// Returns the index and accuracy of the best robot by itself, with votes like the team's.
+    pub(crate) fn best_body(&self) -> Option<(usize, Accuracy)> {
+        let alone = |(place, member): (usize, &Member)| {
+            let sides = member.judge();
+            let answer = |(image, walk): (&ImageRef, &Option<f64>)| {
+                let ballot = Ballot::count(&self.classes, [(&sides, *walk)], self.threshold, self.clip);
+                (self.classes[ballot.by_votes().0], image.label)
+            };
+            (place, Accuracy::of(self.images.iter().zip(&member.displacements).map(answer)))
+        };
+        // The first of several equal ones.
+        self.members
+            .iter()
+            .enumerate()
+            .map(alone)
+            .reduce(|best, next| if next.1.right > best.1.right { next } else { best })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn sides(left: &[u8], right: &[u8]) -> Judge {
-        Judge { left: left.to_vec(), right: right.to_vec() }
+    fn sides(left: &[u8], right: &[u8]) -> Readout {
+        Readout { left: left.to_vec(), right: right.to_vec() }
     }
 
-    fn count(walks: &[(&Judge, Option<f64>)]) -> Ballot {
+    fn count(walks: &[(&Readout, Option<f64>)]) -> Ballot {
         Ballot::count(&[0, 1, 2], walks.iter().copied(), 3.0, CLIP)
     }
 

@@ -26,7 +26,7 @@ use crate::draw::scene::Look;
 use crate::robots::selection::Selection;
 use crate::search::held_out_run;
 use crate::store::images::{HeldOut, HowMany};
-use crate::task::direction;
+use crate::task::answer;
 use clap::builder::{StringValueParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -326,7 +326,7 @@ pub(super) struct EvalArgs {
     #[arg(long, value_name = "NAME")]
     pub(super) dataset: Option<String>,
     /// Displacements up to this many voxel lengths are wrong.
-    #[arg(long, default_value_t = direction::THRESHOLD, value_parser = decimal())]
+    #[arg(long, default_value_t = answer::THRESHOLD, value_parser = decimal())]
     pub(super) threshold: f64,
     /// Actuation cycles per image.
     #[arg(long, default_value_t = held_out_run::CYCLES, value_parser = whole::<u32>(1..=10_000))]

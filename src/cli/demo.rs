@@ -18,7 +18,7 @@ use crate::store::folder;
 use crate::store::folder::IfExists;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{EVAL_JSON, RUN_JSON};
-use crate::task::direction::THRESHOLD;
+use crate::task::answer::THRESHOLD;
 use crate::training;
 use clap::Args;
 use std::path::PathBuf;

@@ -12,7 +12,7 @@ use crate::robots;
 use crate::robots::published;
 use crate::robots::selection::Selection;
 use crate::store::images::{DatasetRef, ImageRef};
-use crate::task::judge::Judge;
+use crate::task::answer::Readout;
 use crate::task::protocol::RolloutMode;
 use crate::task::recording::{Recording, Seen};
 use crate::task::rollout::record;
@@ -194,7 +194,7 @@ pub struct Found {
     /// Description on a page: words and values.
     pub about: Vec<(String, String)>,
     /// Rule that turns its walks into answers.
-    judge: Option<Judge>,
+    judge: Option<Readout>,
     /// The run.json it comes from.
     pub archive: PathBuf,
 }

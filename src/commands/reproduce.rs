@@ -22,7 +22,7 @@ use crate::store::eval::EvalFile;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
 use crate::store::run::StoredRun;
-use crate::task::direction;
+use crate::task::answer;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -271,7 +271,7 @@ impl Job<'_> {
             split: HeldOut::Test,
             validation: None,
             seed: 1,
-            threshold: direction::THRESHOLD,
+            threshold: answer::THRESHOLD,
             cycles: held_out_run::CYCLES,
             dataset: None,
             out: path.to_path_buf(),

@@ -30,7 +30,7 @@ use crate::store::response::{
 };
 use crate::store::results::replaced;
 use crate::store::unwritten::Unwritten;
-use crate::task::direction;
+use crate::task::answer;
 use crate::task::evaluation::fresh_rollouts_so_far;
 use crate::task::grouping::{Groups, balanced};
 use crate::task::perturbation::Condition;
@@ -382,8 +382,7 @@ impl Task {
             Ok(Example { right, weight, ..Example::new(gait, &seen, &config.physics) })
         };
         let examples = self.images.iter().zip(ways).map(example).collect::<Result<Vec<Example>, Error>>()?;
-        let found =
-            teachable(shown, response.scatter, &examples, direction::THRESHOLD, config.seed, session)?;
+        let found = teachable(shown, response.scatter, &examples, answer::THRESHOLD, config.seed, session)?;
         Ok(found.map(|teachable| Taught { margin, ..teachable.into() }))
     }
 }

@@ -1,6 +1,6 @@
 //! `morphcog team`: robots of several runs, each for two groups, classify images together.
 
-use crate::analysis::votes::{Accuracy, Ballot, CLIP};
+use crate::analysis::votes::{Ballot, CLIP};
 use crate::base::Grid;
 use crate::base::error::Error;
 use crate::base::observer::Work;
@@ -15,20 +15,21 @@ use crate::data::dataset::{Dataset, Split};
 use crate::images::held_out::{images_besides, test_images};
 use crate::images::whereabouts::{Whereabouts, load_dataset_of, part_of_others, see, see_all};
 use crate::robots::selection::{BEST, Chosen, Selection, VALIDATED};
+use crate::search::held_out_run::Trial;
 use crate::search::held_out_run::{CYCLES, HeldOutRun, control_steps, task_of};
-use crate::store::eval::Trial;
 use crate::store::folder::check_out;
 use crate::store::images::{HeldOut, HowMany, ImageRef};
 use crate::store::names::{TEAM_JSON, TEAM_VALIDATION_JSON};
 use crate::store::results::{self, replaced};
 use crate::store::run::StoredRun;
 use crate::store::run::different;
+use crate::store::team::Accuracy;
 use crate::store::team::{FORMAT, FORMAT_VERSION, Member, TeamBaselines, TeamFile};
 use crate::store::unwritten::Unwritten;
 use crate::store::validation::shown as shown_for_validation;
-use crate::task::direction::THRESHOLD;
+use crate::task::answer::Readout;
+use crate::task::answer::THRESHOLD;
 use crate::task::grouping::{self, Group};
-use crate::task::judge::Judge;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -328,7 +329,7 @@ fn baselines(
     };
     let pair = |a: u8, b: u8| {
         // A positive value is a walk to the right.
-        let judge = Judge { left: vec![b], right: vec![a] };
+        let judge = Readout { left: vec![b], right: vec![a] };
         let is_pair = |split: &grouping::Split| {
             let mut told = [Group::A, Group::B].map(|group| split.classes(group).to_vec());
             told.sort();
@@ -349,7 +350,7 @@ fn baselines(
     let pairs =
         classes.iter().enumerate().flat_map(|(number, a)| classes[number + 1..].iter().map(|b| (*a, *b)));
     // The values of each pair's function, image by image.
-    let pairs: Vec<(Judge, Vec<f64>)> = pairs.map(|(a, b)| pair(a, b)).collect::<Result<_, Error>>()?;
+    let pairs: Vec<(Readout, Vec<f64>)> = pairs.map(|(a, b)| pair(a, b)).collect::<Result<_, Error>>()?;
     let voted = |image: usize| {
         let walks = pairs.iter().map(|(judge, values)| (judge, Some(values[image])));
         classes[Ballot::count(classes, walks, 0.0, 1.0).by_votes().0]

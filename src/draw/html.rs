@@ -9,7 +9,7 @@ use crate::draw::colour::{TONE_AREAS, mark, tones};
 use crate::draw::error::{PictureError, write_whole};
 use crate::draw::gif;
 use crate::draw::walk::Walk;
-use crate::task::direction::THRESHOLD;
+use crate::task::answer::THRESHOLD;
 use crate::task::recording::{Recording, VoxelCorners};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;

@@ -7,7 +7,7 @@ use crate::draw::scene::{Primitive, ruler};
 use crate::draw::stage::Stage;
 use crate::draw::walk::Walk;
 use crate::draw::{colour, fonts};
-use crate::task::judge;
+use crate::task::answer;
 use crate::task::recording::Seen;
 
 /// The side of the stimulus picture at zoom 1, pixels.
@@ -57,7 +57,7 @@ pub fn least_width(walk: &Walk) -> f64 {
     let sides = judge.iter().flat_map(|j| [(f64::NEG_INFINITY, &j.left), (f64::INFINITY, &j.right)]);
     let verdicts = sides.map(|(moved, classes)| {
         let class = classes.first().copied().unwrap_or_default();
-        large(&judge::verdict(judge, moved, class, true))
+        large(&answer::verdict(judge, moved, class, true))
     });
     let words = verdicts.fold(distance.max(small(&time)), f64::max);
     MARGIN + STIMULUS + GAP + words + GAP + LEGEND + MARGIN
@@ -72,7 +72,7 @@ pub struct Readout {
     pub time: String,
     /// The signed distance in the phase, with the direction as an arrow.
     pub displacement: String,
-    /// The conclusion from the distance ([`judge::verdict`]).
+    /// The conclusion from the distance ([`answer::verdict`]).
     pub verdict: String,
 }
 
@@ -97,7 +97,7 @@ pub fn readout(walk: &Walk, frame: usize) -> Readout {
         label: label.clone(),
         time: format!("step {step}/{} · cycle {}", last - frames.start, number::fixed(cycles, 1)),
         displacement: format!("{arrow} {}", signed(d)),
-        verdict: judge::verdict(walk.recording().judge.as_ref(), d, *class, frame + 1 >= frames.end),
+        verdict: answer::verdict(walk.recording().judge.as_ref(), d, *class, frame + 1 >= frames.end),
     }
 }
 
@@ -230,7 +230,7 @@ fn numbers(walk: &Walk, frame: usize, stage: &Stage, out: &mut Vec<Primitive>) {
 mod tests {
     use super::*;
     use crate::draw::simulated;
-    use crate::task::judge::Judge;
+    use crate::task::answer::Readout;
 
     #[test]
     fn readouts_count_steps_of_the_phase_and_agree_with_the_displacement() {
@@ -261,7 +261,7 @@ mod tests {
             (vec![0, 1, 2], vec![3], 320),
             ((0..5).collect(), (5..10).collect(), 400),
         ] {
-            recording.judge = Some(Judge { left, right });
+            recording.judge = Some(Readout { left, right });
             let walk = Walk::new(&recording).unwrap();
             let verdict = readout(&walk, 50).verdict;
             assert!(verdict.ends_with(": correct"), "{verdict}");

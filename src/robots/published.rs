@@ -14,8 +14,8 @@ use crate::store::audit::AuditFile;
 use crate::store::images::{DatasetRef, ImageRef};
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
 use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
-use crate::task::direction::Direction;
-use crate::task::judge::Judge;
+use crate::task::answer::Direction;
+use crate::task::answer::Readout;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -53,9 +53,9 @@ pub struct Published {
 
 impl Published {
     /// Returns the classes that its two directions stand for.
-    pub fn judge(&self) -> Judge {
+    pub fn judge(&self) -> Readout {
         let says = |way| if way == self.zero_walks { vec![0] } else { vec![1] };
-        Judge { left: says(Direction::Left), right: says(Direction::Right) }
+        Readout { left: says(Direction::Left), right: says(Direction::Right) }
     }
 }
 

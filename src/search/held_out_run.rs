@@ -4,12 +4,18 @@ use crate::base::Grid;
 use crate::base::error::Error;
 use crate::base::observer::Work;
 use crate::base::session::Session;
+use crate::base::statistics::{bootstrap, standard_deviation, wilson};
 use crate::base::text::counted;
 use crate::config::Config;
-use crate::store::run::Robot;
+use crate::store::eval::{EvalFile, Mean, RobotReport};
+use crate::store::images::ImageRef;
+use crate::store::run::{Robot, RunFile};
+use crate::task::answer::{Assignment, is_correct};
 use crate::task::evaluation::fresh_rollouts;
 use crate::task::grouping::{self, Grouping};
+use crate::task::grouping::{Group, Split};
 use crate::task::protocol::{Protocol, RolloutMode};
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Actuation cycles per image in the paper's test.
@@ -77,5 +83,79 @@ impl<'a> HeldOutRun<'a> {
         });
         let (displacements, simulated) = found.ok()?;
         Some((displacements.into_iter().map(Result::ok).collect(), simulated))
+    }
+}
+
+/// The evaluation of one robot on images.
+pub(crate) struct Trial<'a> {
+    pub run: &'a RunFile,
+    pub robot: &'a Robot,
+    pub split: &'a Split,
+    pub images: &'a [ImageRef],
+    pub threshold: f64,
+}
+
+impl RobotReport {
+    pub(crate) fn new(trial: &Trial, displacements: Vec<Option<f64>>, simulated: usize) -> Self {
+        let Trial { run, robot, split, images, threshold } = *trial;
+        let assignment = Assignment::from_training(split, run.fitness(), &run.answers(robot));
+        let is_right = |(image, walk): (&ImageRef, &Option<f64>)| {
+            is_correct(split, assignment, image.label, *walk, threshold).unwrap_or(false)
+        };
+        let verdicts: Vec<(u8, bool)> =
+            images.iter().zip(&displacements).map(|pair| (pair.0.label, is_right(pair))).collect();
+        let share = |of: &dyn Fn(u8) -> bool| {
+            let chosen = verdicts.iter().filter(|(class, _)| of(*class));
+            let (right, all) =
+                chosen.fold((0usize, 0usize), |(r, n), (_, right)| (r + usize::from(*right), n + 1));
+            (right as f64 / all.max(1) as f64, right)
+        };
+        let (accuracy, right) = share(&|_| true);
+        let group = |g: Group| share(&|class| split.group(class) == Some(g)).0;
+        let classes: BTreeSet<u8> = images.iter().map(|image| image.label).collect();
+        let moved: Vec<f64> = displacements.iter().flatten().map(|d| d.abs()).collect();
+        let count = images.len().max(1) as f64;
+        RobotReport {
+            id: robot.id.clone(),
+            run: 0,
+            task: robot.task.clone(),
+            objective: robot.objective,
+            first_group_walks: assignment.expected(Group::A).name().to_string(),
+            right,
+            images: images.len(),
+            accuracy,
+            interval: wilson(right, images.len()),
+            balanced_accuracy: (group(Group::A) + group(Group::B)) / 2.0,
+            per_class: classes.into_iter().map(|class| (class, share(&|c| c == class).0)).collect(),
+            mean_distance: moved.iter().sum::<f64>() / moved.len().max(1) as f64,
+            not_moved: moved.iter().filter(|&&d| d <= threshold).count() as f64 / count,
+            unstable: displacements.len() - moved.len(),
+            simulated,
+            validation: None,
+            displacements,
+        }
+    }
+}
+
+impl EvalFile {
+    /// Averages over the robots so far.
+    pub(crate) fn conclude(&mut self) {
+        let mut by_task = BTreeMap::<&str, Vec<&RobotReport>>::new();
+        self.robots.iter().for_each(|robot| by_task.entry(&robot.task).or_default().push(robot));
+        let mean = |robots: &[&RobotReport], of: fn(&RobotReport) -> f64| {
+            robots.iter().map(|robot| of(robot)).sum::<f64>() / robots.len() as f64
+        };
+        let means = by_task.into_iter().map(|(task, robots)| {
+            let (accuracy, balanced_accuracy) =
+                (mean(&robots, |r| r.accuracy), mean(&robots, |r| r.balanced_accuracy));
+            let accuracies: Vec<f64> = robots.iter().map(|robot| robot.accuracy).collect();
+            let mut by_run = BTreeMap::<usize, Vec<f64>>::new();
+            robots.iter().for_each(|robot| by_run.entry(robot.run).or_default().push(robot.accuracy));
+            let by_run: Vec<Vec<f64>> = by_run.into_values().collect();
+            let (standard_deviation, interval) = (standard_deviation(&accuracies), bootstrap(&by_run));
+            let robots = robots.len();
+            (task.to_string(), Mean { robots, accuracy, balanced_accuracy, standard_deviation, interval })
+        });
+        self.means = means.collect();
     }
 }

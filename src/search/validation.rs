@@ -16,13 +16,14 @@ use crate::images::whereabouts::{Whereabouts, load_dataset_of, see_all};
 use crate::robots::selection::{Chosen, Selection, first_physical};
 use crate::search::held_out_run;
 use crate::search::held_out_run::HeldOutRun;
-use crate::store::eval::{RobotReport, Trial};
+use crate::search::held_out_run::Trial;
+use crate::store::eval::RobotReport;
 use crate::store::images::ImageRef;
 use crate::store::names::VALIDATION_JSON;
 use crate::store::run::StoredRun;
 use crate::store::run::{Robot, RunFile};
 use crate::store::validation::{FORMAT, Ranking, Validated, ValidationFile};
-use crate::task::direction;
+use crate::task::answer;
 use crate::task::grouping;
 use crate::task::grouping::Grouping;
 use std::collections::BTreeMap;
@@ -107,7 +108,7 @@ fn ranked(
     let skilled = |robot: &&Robot| held_out_run::task_of(&grouping, robot).is_some();
     let robots = chosen.iter().map(|chosen| chosen.robot).filter(skilled).collect();
     let images = config.validation.images;
-    let wanted = Wanted { count, images, argument: None, threshold: direction::THRESHOLD };
+    let wanted = Wanted { count, images, argument: None, threshold: answer::THRESHOLD };
     let best = best(source, dataset, &grouping, robots, &wanted, &walker)?;
     Ok(best.map(|best| best.into_iter().map(|(_, validated)| validated).collect()))
 }
@@ -209,8 +210,7 @@ fn is_own(run: &RunFile, robots: &[&Robot], wanted: &Wanted, control_steps: u32)
     let ValidationConfig { images, best } = run.config.validation;
     let Ok(grouping) = run.config.grouping() else { return false };
     let all = run.elites.iter().filter(|robot| held_out_run::task_of(&grouping, robot).is_some()).count();
-    let usual =
-        (images, direction::THRESHOLD, held_out_run::control_steps(&run.config, held_out_run::CYCLES));
+    let usual = (images, answer::THRESHOLD, held_out_run::control_steps(&run.config, held_out_run::CYCLES));
     (wanted.images, wanted.threshold, control_steps) == usual
         && (best == 0 || wanted.count == best)
         && robots.len() == all

@@ -13,7 +13,7 @@ use crate::store::audit::AuditFile;
 use crate::store::images::DatasetRef;
 use crate::store::names::RUN_JSON;
 use crate::store::run::{Robot, RunFile};
-use crate::task::judge::Judge;
+use crate::task::answer::Readout;
 use crate::task::protocol::Protocol;
 use crate::task::stimulus::StimulusParams;
 use serde::Serialize;
@@ -63,7 +63,7 @@ pub struct Entry {
     /// The parameters of its stimulus.
     pub encoding: StimulusParams,
     /// The judge of its walks; `None` if all classes walk the same way.
-    pub judge: Option<Judge>,
+    pub judge: Option<Readout>,
     /// The result of an audit, if one is beside the archive.
     pub audit: Option<Audited>,
     /// The body.
@@ -82,7 +82,7 @@ pub struct Who {
     /// The parameters of its stimulus.
     pub encoding: StimulusParams,
     /// The judge of its walks; `None` for a body without a task.
-    pub judge: Option<Judge>,
+    pub judge: Option<Readout>,
 }
 
 /// The result of an audit.

@@ -3,7 +3,7 @@
 use crate::serve::request::{MAX_STEPS, Pace, Plan, Seen};
 use crate::serve::simulations::{Control, Slot};
 use crate::sim::{StepError, System};
-use crate::task::judge::{Answer, answer};
+use crate::task::answer::{Reading, answer};
 use crate::task::recording::{Frame, VoxelCorners};
 use crate::task::rollout::Rollout;
 use std::sync::Arc;
@@ -51,7 +51,7 @@ pub enum Event<'a> {
         /// The moments, one per control step.
         frames: &'a [Frame],
         /// The answer so far.
-        answer: Answer,
+        answer: Reading,
     },
     /// The simulation is paused.
     Still,
@@ -60,7 +60,7 @@ pub enum Event<'a> {
         /// The control steps simulated.
         step: u32,
         /// The final answer.
-        answer: Answer,
+        answer: Reading,
         /// The reason if it ended early.
         unstable: Option<String>,
     },

@@ -8,7 +8,7 @@ use crate::serve::catalogue::Who;
 use crate::serve::request::{Plan, Seen};
 use crate::serve::simulation::{Event, STEPS_PER_SECOND};
 use crate::serve::team::{Name, TeamEvent};
-use crate::task::direction::THRESHOLD;
+use crate::task::answer::THRESHOLD;
 use crate::task::recording::{Frame, VoxelCorners};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;

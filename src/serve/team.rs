@@ -8,8 +8,8 @@ use crate::serve::request::{MAX_STEPS, Pace, Seen, Shown};
 use crate::serve::simulation::{Clock, Gone, HEARTBEAT};
 use crate::serve::simulations::Slot;
 use crate::sim::{StepError, System};
-use crate::task::direction::THRESHOLD;
-use crate::task::judge::Judge;
+use crate::task::answer::Readout;
+use crate::task::answer::THRESHOLD;
 use crate::task::recording::{Frame, VoxelCorners};
 use crate::task::rollout::Rollout;
 use crate::task::stimulus::StimulusParams;
@@ -31,7 +31,7 @@ pub struct Name {
     /// The task, such as "4|9".
     pub task: String,
     /// The judge of its walks.
-    pub judge: Judge,
+    pub judge: Readout,
 }
 
 /// Returns the team: for every task, the fittest robot of the first archive that has one. All share
@@ -72,7 +72,7 @@ fn largest<'a>(collections: impl IntoIterator<Item = (usize, &'a Arc<Collection>
 }
 
 /// Returns the classes that a team tells apart, in order.
-pub fn classes<'a>(judges: impl IntoIterator<Item = &'a Judge>) -> Vec<u8> {
+pub fn classes<'a>(judges: impl IntoIterator<Item = &'a Readout>) -> Vec<u8> {
     let all: BTreeSet<u8> =
         judges.into_iter().flat_map(|judge| judge.left.iter().chain(&judge.right)).copied().collect();
     all.into_iter().collect()
@@ -189,7 +189,7 @@ pub fn live(
         rollout.look_at(&seen.stimulus);
         walkers.push(Walker { rollout, is_unstable: false });
     }
-    let judges: Vec<&Judge> = plan.members.iter().map(|(name, _, _)| &name.judge).collect();
+    let judges: Vec<&Readout> = plan.members.iter().map(|(name, _, _)| &name.judge).collect();
     let classes = classes(judges.iter().copied());
     let stands = walkers.iter().map(|walker| (walker.rollout.voxels(), walker.rollout.frame())).collect();
     tell(TeamEvent::Begin { id: slot.id, plan, classes: &classes, stands })?;
@@ -235,7 +235,7 @@ pub fn live(
 }
 
 /// Counts the votes so far.
-fn tally(walkers: &[Walker], judges: &[&Judge], classes: &[u8]) -> Tally {
+fn tally(walkers: &[Walker], judges: &[&Readout], classes: &[u8]) -> Tally {
     let moved = walkers.iter().map(|walker| (!walker.is_unstable).then(|| walker.rollout.moved())).collect();
     Tally::of(classes, judges, moved, (THRESHOLD, CLIP))
 }
@@ -253,8 +253,8 @@ mod tests {
     use std::sync::atomic::AtomicBool;
 
     fn plan() -> TeamPlan {
-        let judge = |a, b| Judge { left: vec![a], right: vec![b] };
-        let member = |body: &str, judge: Judge| {
+        let judge = |a, b| Readout { left: vec![a], right: vec![b] };
+        let member = |body: &str, judge: Readout| {
             let who = Who {
                 body: body.parse().unwrap(),
                 physics: Physics::default(),

@@ -16,9 +16,9 @@ use crate::store::folder;
 use crate::store::images::{DatasetRef, ImageRef, answers};
 use crate::store::results::{self, Stored, by_lines};
 use crate::store::training::Origin;
-use crate::task::direction::Assignment;
+use crate::task::answer::Assignment;
+use crate::task::answer::Readout;
 use crate::task::fitness::Fitness;
-use crate::task::judge::Judge;
 use crate::task::score::Answer;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -287,13 +287,13 @@ impl RunFile {
     }
 
     /// Returns the judge of a robot's walks, or `None` for a gait or a robot of the same-way task.
-    pub fn judge(&self, robot: &Robot) -> Option<Judge> {
+    pub fn judge(&self, robot: &Robot) -> Option<Readout> {
         if self.config.measures_response() {
             return None;
         }
         let grouping = self.config.grouping().ok()?;
         let split = grouping.tasks().iter().find(|split| split.is_called(&robot.task))?;
-        Judge::of(split, Assignment::from_training(split, self.fitness(), &self.answers(robot)))
+        Readout::of(split, Assignment::from_training(split, self.fitness(), &self.answers(robot)))
     }
 
     /// Returns true if displacements are those of bodies under the training images by the config's

@@ -1,16 +1,13 @@
 //! `team.json` and `team.csv`: the joint answers of robots of several runs.
 
-use crate::analysis::votes::{Accuracy, Ballot};
 use crate::base::error::Error;
 use crate::base::ranges;
 use crate::base::table;
 use crate::body::Body;
-use crate::store::eval::Trial;
 use crate::store::images::{HeldOut, ImageRef};
 use crate::store::results::{self, Stored, write_with_table};
-use crate::task::direction::{Assignment, Direction};
-use crate::task::grouping::Group;
-use crate::task::judge::Judge;
+use crate::task::answer::Direction;
+use crate::task::answer::Readout;
 use crate::task::protocol::MAX_STEPS;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -160,6 +157,32 @@ pub struct TeamBaselines {
     pub best_body_id: String,
 }
 
+/// The accuracy on some images.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Accuracy {
+    /// Images answered correctly.
+    pub right: usize,
+    /// Fraction answered correctly.
+    #[serde(deserialize_with = "ranges::share")]
+    pub accuracy: f64,
+    /// Its 95 % Wilson interval.
+    #[serde(deserialize_with = "ranges::interval")]
+    pub interval: [f64; 2],
+}
+
+impl Accuracy {
+    /// Checks that it covers at most this many images.
+    ///
+    /// # Errors
+    /// If more are correct, the error names the key.
+    pub(crate) fn check(&self, images: usize) -> Result<(), Error> {
+        match self.right <= images {
+            true => Ok(()),
+            false => Err(Error::at_key("right", format!("expected at most {images}, found {}", self.right))),
+        }
+    }
+}
+
 impl Stored for TeamFile {
     const FORMAT: (&'static str, u32) = (FORMAT, FORMAT_VERSION);
 
@@ -241,113 +264,17 @@ impl Stored for TeamFile {
 
 impl Member {
     /// Returns the classes that a walk of this robot to either side votes for.
-    pub fn judge(&self) -> Judge {
+    pub fn judge(&self) -> Readout {
         let [a, b] = self.groups.clone();
         if self.first_group_walks == Direction::Left.name() {
-            Judge { left: a, right: b }
+            Readout { left: a, right: b }
         } else {
-            Judge { left: b, right: a }
-        }
-    }
-
-    /// Creates a member from a run's robot and its displacements, with its accuracy.
-    pub(crate) fn new(trial: &Trial, run_sha256: &str, displacements: Vec<Option<f64>>) -> Self {
-        let Trial { run, robot, split, images, threshold } = *trial;
-        let assignment = Assignment::from_training(split, run.fitness(), &run.answers(robot));
-        let is_right = |(image, walk): (&ImageRef, &Option<f64>)| {
-            let group = split.group(image.label)?;
-            Some(walk.is_some_and(|walk| assignment.is_right(group, walk, threshold)))
-        };
-        let own = images.iter().zip(&displacements).filter_map(is_right).map(|is_right| (is_right, true));
-        let own = Accuracy::of(own);
-        let is_still = |walk: &&Option<f64>| walk.is_none_or(|walk| Direction::of(walk, threshold).is_none());
-        let still = displacements.iter().filter(is_still).count();
-        Member {
-            id: robot.id.clone(),
-            run: run.name.clone(),
-            run_sha256: run_sha256.to_string(),
-            task: robot.task.clone(),
-            groups: [Group::A, Group::B].map(|group| split.classes(group).to_vec()),
-            first_group_walks: assignment.expected(Group::A).name().to_string(),
-            body: robot.body.clone(),
-            own,
-            not_moved: still as f64 / images.len().max(1) as f64,
-            displacements,
-        }
-    }
-}
-
-impl Decoded {
-    fn new(classes: &[u8], images: &[ImageRef], places: &[usize]) -> Self {
-        let place_of = |class: u8| classes.iter().position(|other| *other == class).unwrap_or(0);
-        let mut confusion = vec![vec![0; classes.len()]; classes.len()];
-        for (image, answer) in images.iter().zip(places) {
-            confusion[place_of(image.label)][*answer] += 1;
-        }
-        let share = |(place, class): (usize, &u8)| {
-            let all: usize = confusion[place].iter().sum();
-            (*class, confusion[place][place] as f64 / all.max(1) as f64)
-        };
-        let answers: Vec<u8> = places.iter().map(|place| classes[*place]).collect();
-        Decoded {
-            accuracy: Accuracy::of(answers.iter().copied().zip(images.iter().map(|image| image.label))),
-            per_class: classes.iter().enumerate().map(share).collect(),
-            confusion,
-            answers,
+            Readout { left: b, right: a }
         }
     }
 }
 
 impl TeamFile {
-    /// Counts the votes of all walks under an image.
-    fn ballot(&self, sides: &[Judge], image: usize) -> Ballot {
-        let walks =
-            sides.iter().zip(&self.members).map(|(sides, member)| (sides, member.displacements[image]));
-        Ballot::count(&self.classes, walks, self.threshold, self.clip)
-    }
-
-    /// Returns the members' joint answers to all images.
-    pub(crate) fn decided(&self) -> Answers {
-        let sides: Vec<Judge> = self.members.iter().map(Member::judge).collect();
-        let ballots: Vec<Ballot> = (0..self.images.len()).map(|image| self.ballot(&sides, image)).collect();
-        let knows = |class: &u8| {
-            sides.iter().filter(|sides| sides.left.contains(class) || sides.right.contains(class)).count()
-        };
-        let known: Vec<usize> = self.classes.iter().map(knows).collect();
-        let by_votes: Vec<(usize, bool)> = ballots.iter().map(Ballot::by_votes).collect();
-        let by_walks: Vec<usize> = ballots.iter().map(Ballot::by_walks).collect();
-        let places: Vec<usize> = by_votes.iter().map(|(place, _)| *place).collect();
-        let count = self.images.len().max(1) as f64;
-        let agreement = ballots.iter().zip(&places);
-        let agreement =
-            agreement.map(|(ballot, place)| ballot.votes[*place] as f64 / known[*place].max(1) as f64);
-        Answers {
-            votes: Decoded::new(&self.classes, &self.images, &places),
-            walks: Decoded::new(&self.classes, &self.images, &by_walks),
-            ties: by_votes.iter().filter(|(_, tied)| *tied).count() as f64 / count,
-            agreement: agreement.sum::<f64>() / count,
-            not_moved: ballots.iter().map(|ballot| ballot.silent as f64).sum::<f64>() / count,
-        }
-    }
-
-    /// Returns the index and accuracy of the best robot by itself, with votes like the team's.
-    pub(crate) fn best_body(&self) -> Option<(usize, Accuracy)> {
-        let alone = |(place, member): (usize, &Member)| {
-            let sides = member.judge();
-            let answer = |(image, walk): (&ImageRef, &Option<f64>)| {
-                let ballot = Ballot::count(&self.classes, [(&sides, *walk)], self.threshold, self.clip);
-                (self.classes[ballot.by_votes().0], image.label)
-            };
-            (place, Accuracy::of(self.images.iter().zip(&member.displacements).map(answer)))
-        };
-        // The first of several equal ones.
-        self.members
-            .iter()
-            .enumerate()
-            .map(alone)
-            .reduce(|best, next| if next.1.right > best.1.right { next } else { best })
-    }
-
     /// Reads a team.json.
     ///
     /// # Errors

@@ -1,10 +1,9 @@
 //! A robot's task: stimuli, protocols, rollouts and scores; how a gait responds and is trained.
 
-pub mod direction;
+pub mod answer;
 pub mod evaluation;
 pub mod fitness;
 pub mod grouping;
-pub mod judge;
 pub mod margins;
 pub mod objective;
 pub mod perturbation;

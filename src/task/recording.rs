@@ -2,7 +2,7 @@
 
 use crate::base::Grid;
 use crate::body::Body;
-use crate::task::judge::Judge;
+use crate::task::answer::Readout;
 
 /// An image and its stimulus.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,5 +66,5 @@ pub struct Recording {
     /// True if the rollout ended early as unstable.
     pub unstable: bool,
     /// Meaning of the robot's walks; none for a robot without a task.
-    pub judge: Option<Judge>,
+    pub judge: Option<Readout>,
 }

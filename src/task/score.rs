@@ -6,7 +6,7 @@
 //! things follow that make savings lossless: fitness is continuous (d = 0 counts as wrong, with
 //! margin 0), and the fitness on some of the images is an upper bound of that on all.
 
-use crate::task::direction::Assignment;
+use crate::task::answer::Assignment;
 use crate::task::fitness::{Fitness, better};
 use crate::task::grouping::{Group, Grouping, Split};
 
@@ -128,7 +128,7 @@ impl Grouping {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::task::direction::{Assignment, Direction};
+    use crate::task::answer::{Assignment, Direction};
     use Group::{A, B};
     use proptest::prelude::*;
 

@@ -15,7 +15,7 @@ use morphcog::robots::published;
 use morphcog::serve::simulations::MAX_SIMULATIONS;
 use morphcog::shipped::gallery::TEAM;
 use morphcog::sim::Physics;
-use morphcog::task::direction::Direction;
+use morphcog::task::answer::Direction;
 use morphcog::task::evaluation::fresh_rollouts;
 use morphcog::task::protocol::Protocol;
 use morphcog::task::recording::{Frame, Seen};

@@ -12,7 +12,7 @@ use crate::store::folder::IfExists;
 use crate::store::lock::Lock;
 use crate::store::names::{AUDIT_JSON, RUN_JSON, TASK_JSON, TASK_LOCK};
 use crate::store::task::{State, TaskFile};
-use crate::task::direction;
+use crate::task::answer;
 use crate::training;
 use std::time::Instant;
 
@@ -94,7 +94,7 @@ pub(crate) fn test_of(task: &Task, place: &Place) -> Result<Option<eval::Options
         split: step.split,
         validation: None,
         seed: 1,
-        threshold: direction::THRESHOLD,
+        threshold: answer::THRESHOLD,
         cycles: held_out_run::CYCLES,
         dataset: None,
         out: folder.join(eval::own_name(step.split)),

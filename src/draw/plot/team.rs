@@ -10,7 +10,7 @@ use crate::draw::plot::canvas::{Canvas, Pen, TEXT, Words};
 use crate::draw::plot::figure::{COLUMN, Figure, PAGE};
 use crate::draw::plot::{robot, scales};
 use crate::store::team::{Member, TeamFile};
-use crate::task::direction::Direction;
+use crate::task::answer::Direction;
 
 /// Space between bodies, points.
 const GAP: f64 = 4.0;
@@ -195,7 +195,7 @@ fn ways(member: &Member, most: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::votes::Accuracy;
+    use crate::store::team::Accuracy;
 
     #[test]
     fn a_caption_has_a_bar_between_the_classes_of_the_two_ways() {

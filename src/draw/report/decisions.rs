@@ -1,8 +1,8 @@
 //! The answers of a team, as a table and in remarks, for the page and the terminal.
 
-use crate::analysis::votes::Accuracy;
 use crate::base::number;
 use crate::base::number::percent;
+use crate::store::team::Accuracy;
 use crate::store::team::{Decoded, TeamFile};
 
 /// Published results on the ten digits of MNIST in mechanics.

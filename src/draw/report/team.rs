@@ -12,7 +12,7 @@ use crate::draw::report::decisions;
 use crate::draw::report::{figure, tables};
 use crate::search::held_out_run::control_steps;
 use crate::store::team::Member;
-use crate::task::judge::Judge;
+use crate::task::answer::Readout;
 use crate::task::recording::{Frame, Recording, VoxelCorners};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
@@ -130,8 +130,8 @@ fn robots(team: &Team, walks: &[PackedWalk], shown: &[usize]) -> Value {
 /// Returns all walks under an image, and the tally at every moment.
 fn under_image(team: &Team, number: usize, walks: &[PackedWalk]) -> Value {
     let file = &team.file;
-    let judges: Vec<Judge> = file.members.iter().map(Member::judge).collect();
-    let judges: Vec<&Judge> = judges.iter().collect();
+    let judges: Vec<Readout> = file.members.iter().map(Member::judge).collect();
+    let judges: Vec<&Readout> = judges.iter().collect();
     let tally = |moment: usize| {
         let moved = walks.iter().map(|walk| walk.moved[moment]).collect();
         Tally::of(&file.classes, &judges, moved, (file.threshold, file.clip))

@@ -20,7 +20,7 @@ use crate::store::images::{HowMany, ImageRef};
 use crate::store::names::{CONFIG, EVAL_JSON};
 use crate::store::run::RunFile;
 use crate::store::training::Origin;
-use crate::task::direction;
+use crate::task::answer;
 use crate::task::fitness::Fitness;
 use crate::task::margins::Margins;
 use crate::task::perturbation::ByTurns;
@@ -218,7 +218,7 @@ pub(super) fn commands(dossier: &Dossier, spell: Spell) -> String {
         if report.trained_on.is_some() {
             eval = eval.option("dataset", report.dataset.as_str());
         }
-        if report.threshold != direction::THRESHOLD {
+        if report.threshold != answer::THRESHOLD {
             eval = eval.option("threshold", report.threshold.to_string());
         }
         let cycles = report.control_steps / dossier.run.config.physics.cycle_steps.max(1);
