@@ -68,6 +68,12 @@ const MOST_WINDOWS: usize = 10_000;
 const MOST_ROWS: u32 = 100;
 
 impl TrainConfig {
+    /// Returns the number of windows that are tried: none without rounds, because the robot keeps
+    /// its sensors, which suit its own window.
+    pub(crate) fn windows_tried(&self) -> usize {
+        if self.rounds == 0 { 0 } else { self.windows }
+    }
+
     /// Returns true if files may omit it.
     pub(crate) fn is_default(&self) -> bool {
         *self == TrainConfig::default()

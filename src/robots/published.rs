@@ -13,7 +13,7 @@ use crate::shipped::gallery;
 use crate::store::audit::AuditFile;
 use crate::store::images::{DatasetRef, ImageRef};
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
-use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
+use crate::store::run::{Robot, RunFile};
 use crate::task::answer::Direction;
 use crate::task::answer::Readout;
 use serde::Deserialize;
@@ -161,21 +161,12 @@ pub(crate) fn run() -> Result<RunFile, Error> {
         }
     };
     let train_sha256 = catalogue::MNIST_CONTENT[0].to_string();
-    Ok(RunFile {
-        format: FORMAT.to_string(),
-        format_version: FORMAT_VERSION,
-        program_version: env!("CARGO_PKG_VERSION").to_string(),
-        name: ALL.to_string(),
-        dataset: DatasetRef { name: config.data.dataset.clone(), train_sha256 },
-        training_images,
-        dimensions: Dimensions::of(&config)?,
-        origin: None,
-        generations: config.generations,
-        stats: Archive::<Robot>::new().stats(1, 0.0),
-        elites: gallery()?.into_iter().enumerate().map(robot).collect(),
-        config,
-        read_sha256: None,
-    })
+    let dataset = DatasetRef { name: config.data.dataset.clone(), train_sha256 };
+    let (data, none) = ((&dataset, training_images), Archive::new());
+    let elites = gallery()?.into_iter().enumerate().map(robot).collect();
+    // They fill no archive: several may be in one cell.
+    let stats = none.stats(1, 0.0);
+    Ok(RunFile { elites, stats, ..RunFile::new(ALL, &config, data, config.generations, &none)? })
 }
 
 #[cfg(test)]

@@ -1,7 +1,6 @@
 //! `morphcog evolve`: resumable MAP-Elites over bodies, with the same bits however it is run.
 
 use crate::base::error::{Error, ErrorKind};
-use crate::base::files::write_atomically;
 use crate::base::observer::Generation;
 use crate::base::random::{Purpose, stream};
 use crate::base::remedy::{Invocation, Remedy};
@@ -21,8 +20,8 @@ use crate::store::checkpoint;
 use crate::store::checkpoint::{Checkpoint, KnownBodies};
 use crate::store::folder::{IfExists, RunFolder};
 use crate::store::metrics::{Metrics, Totals};
-use crate::store::names::{ELITES, METRICS, RUN_JSON, TRAINING_JSON};
-use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
+use crate::store::names::{METRICS, RUN_JSON, TRAINING_JSON};
+use crate::store::run::{Dimensions, Robot, RunFile};
 use crate::store::validation::Validated;
 use crate::task::evaluation::{Evaluation, Job, Outcome, evaluate};
 use crate::task::grouping::Grouping;
@@ -469,32 +468,15 @@ impl<'a> Run<'a> {
         let checkpoint =
             Checkpoint { run: self.file(), totals: self.totals(), known_bodies: self.known.clone() };
         checkpoint::write(folder.path(), &checkpoint)?;
-        let run = checkpoint.run;
-        let csv = run.to_csv();
-        for (name, content) in [(RUN_JSON, run.to_json().into_bytes()), (ELITES, csv)] {
-            let path = folder.path().join(name);
-            write_atomically(&path, &content).map_err(|error| Error::writing(&path, &error))?;
-        }
-        Ok(())
+        folder.write_run(&checkpoint.run)
     }
 
     /// Returns the run in its current state.
     fn file(&self) -> RunFile {
-        RunFile {
-            format: FORMAT.to_string(),
-            format_version: FORMAT_VERSION,
-            program_version: env!("CARGO_PKG_VERSION").to_string(),
-            name: self.options.name.clone(),
-            config: self.options.config.clone(),
-            dataset: self.training.dataset.clone(),
-            training_images: self.training.images.clone(),
-            dimensions: self.dimensions.clone(),
-            origin: None,
-            generations: self.generation,
-            stats: self.stats(),
-            elites: self.search.archive().elites().map(|elite| elite.solution.clone()).collect(),
-            read_sha256: None,
-        }
+        let Options { name, config, .. } = self.options;
+        let data = (&self.training.dataset, self.training.images.clone());
+        RunFile::new(name, config, data, self.generation, self.search.archive())
+            .expect("the tasks of the config were read when the run began")
     }
 }
 

@@ -110,6 +110,18 @@ impl RunFolder {
         &self.path
     }
 
+    /// Writes a run: `elites.csv` and `run.json`.
+    ///
+    /// # Errors
+    /// If one cannot be written.
+    pub(crate) fn write_run(&self, run: &RunFile) -> Result<(), Error> {
+        for (name, content) in [(RUN_JSON, run.to_json().into_bytes()), (ELITES, run.to_csv())] {
+            let path = self.path.join(name);
+            write_atomically(&path, &content).map_err(|error| Error::writing(&path, &error))?;
+        }
+        Ok(())
+    }
+
     /// Writes the run's config. An equal one stays as it is, with its comments: it may be the file
     /// that this run was started with.
     ///

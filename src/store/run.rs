@@ -207,6 +207,35 @@ impl Stored for RunFile {
 }
 
 impl RunFile {
+    /// Creates a run of this program from its archive after some generations.
+    ///
+    /// # Errors
+    /// If the config has no tasks.
+    pub(crate) fn new(
+        name: &str,
+        config: &Config,
+        (dataset, training_images): (&DatasetRef, Vec<ImageRef>),
+        generations: u64,
+        archive: &Archive<Robot>,
+    ) -> Result<Self, Error> {
+        let dimensions = Dimensions::of(config)?;
+        Ok(RunFile {
+            format: FORMAT.to_string(),
+            format_version: FORMAT_VERSION,
+            program_version: env!("CARGO_PKG_VERSION").to_string(),
+            name: name.to_string(),
+            config: config.clone(),
+            dataset: dataset.clone(),
+            training_images,
+            stats: archive.stats(dimensions.possible_cells, config.archive.qd_offset),
+            dimensions,
+            origin: None,
+            generations,
+            elites: archive.elites().map(|elite| elite.solution.clone()).collect(),
+            read_sha256: None,
+        })
+    }
+
     /// Reads `run.json`.
     ///
     /// # Errors

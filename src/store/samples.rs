@@ -5,7 +5,7 @@ use crate::config::{BUILT_IN, Config};
 use crate::genome::Genome;
 use crate::qd::Archive;
 use crate::store::images::{DatasetRef, ImageRef};
-use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
+use crate::store::run::{Robot, RunFile};
 
 /// Creates a quick-start run with robots of these ids and objectives, each in its own cell.
 pub fn run(robots: &[(&str, f64)]) -> RunFile {
@@ -27,21 +27,11 @@ pub fn run(robots: &[(&str, f64)]) -> RunFile {
             genome,
         }
     };
-    let run = RunFile {
-        format: FORMAT.to_string(),
-        format_version: FORMAT_VERSION,
-        program_version: "0".to_string(),
-        name: "sample".to_string(),
-        dataset: DatasetRef { name: "builtin".to_string(), train_sha256: "0".to_string() },
-        training_images: vec![image(0), image(1)],
-        dimensions: Dimensions::of(&config).unwrap(),
-        origin: None,
-        generations: 1,
-        stats: Archive::<Robot>::new().stats(1, 0.0),
-        elites: robots.iter().enumerate().map(robot).collect(),
-        config,
-        read_sha256: None,
-    };
+    let dataset = DatasetRef { name: "builtin".to_string(), train_sha256: "0".to_string() };
+    let data = (&dataset, vec![image(0), image(1)]);
+    let elites = robots.iter().enumerate().map(robot).collect();
+    let run = RunFile::new("sample", &config, data, 1, &Archive::new()).unwrap();
+    let run = RunFile { elites, program_version: "0".to_string(), ..run };
     let stats =
         |archive: Archive<Robot>| archive.stats(run.dimensions.possible_cells, run.config.archive.qd_offset);
     // Some tests need robots that no archive can hold.

@@ -53,17 +53,23 @@ pub(super) fn origin(source: &StoredRun, config: &Config, dataset: &Dataset) -> 
         sha256: run.fingerprint(),
         trained_on: trained_on.into_iter().collect(),
         elsewhere,
-        windows: if config.train.rounds == 0 { 0 } else { config.train.windows },
+        windows: config.train.windows_tried(),
     })
 }
 
 pub(super) fn walkers<'a>(
     source: &'a StoredRun,
     robots: &Selection,
+    train: &TrainConfig,
     seed: u64,
 ) -> Result<Vec<Walker<'a>>, Error> {
     let mut walkers: Vec<Walker> = Vec::new();
-    for chosen in robots.of(std::slice::from_ref(source), seed)? {
+    let mut chosen = robots.of(std::slice::from_ref(source), seed)?;
+    if train.rounds == 0 {
+        // One robot is refined as it is: the fittest, or the first of equals.
+        chosen.sort_by(|a, b| b.robot.objective.total_cmp(&a.robot.objective));
+    }
+    for chosen in chosen {
         let Some(gait) = Gait::of(&chosen.robot.body) else { continue };
         if walkers.iter().all(|other| other.gait.probe() != gait.probe()) {
             walkers.push(Walker { robot: chosen.robot, gait });

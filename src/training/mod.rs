@@ -15,7 +15,6 @@ pub use config::check;
 pub(crate) use config::{check_groups, config_of, sized, with_images};
 
 use crate::base::error::Error;
-use crate::base::files::write_atomically;
 use crate::base::remedy::Remedy;
 use crate::base::session::Session;
 use crate::base::text::counted;
@@ -31,9 +30,9 @@ use crate::search::validation;
 use crate::store::folder::{IfExists, RunFolder};
 use crate::store::images::ImageRef;
 use crate::store::metrics::{Metrics, Totals};
-use crate::store::names::{ELITES, RUN_JSON, TRAINING_JSON};
+use crate::store::names::{RUN_JSON, TRAINING_JSON};
 use crate::store::run::StoredRun;
-use crate::store::run::{Dimensions, FORMAT, FORMAT_VERSION, Robot, RunFile};
+use crate::store::run::{Robot, RunFile};
 use crate::store::training::Origin;
 use crate::store::validation::Validated;
 use crate::task::grouping::Groups;
@@ -104,11 +103,7 @@ pub fn train(options: &Options, session: &Session) -> Result<Finished, Error> {
     let mut training = Training::of(&config, &dataset)?;
     let classes = training.images.iter().map(|image| image.label);
     training.conditions = config.train.perturbations.of(classes);
-    let mut walkers = walkers(&source, &options.robots, config.seed)?;
-    if config.train.rounds == 0 {
-        // Without rounds, one robot is refined as it is: the fittest, or the first of equals.
-        walkers.sort_by(|a, b| b.robot.objective.total_cmp(&a.robot.objective));
-    }
+    let walkers = walkers(&source, &options.robots, &config.train, config.seed)?;
     // The seed is that of the gaits: a response holds for every task and training seed.
     let probing = Probing::new(&training.conditions, source.run.config.seed);
     let measured = measured(&source, &config, &probing, &walkers, session);
@@ -119,10 +114,6 @@ pub fn train(options: &Options, session: &Session) -> Result<Finished, Error> {
     }
     apart(&options.out, &source.path)?;
     let folder = RunFolder::open(&options.out, options.if_exists, session)?;
-    let write = |name: &str, content: &[u8]| {
-        let path = folder.path().join(name);
-        write_atomically(&path, content).map_err(|error| Error::writing(&path, &error))
-    };
     let key = key(&config, source.run.config.seed, &walkers, &training);
     let mut log = Log::open(log, key, session)?;
     folder.write_config(&config)?;
@@ -143,12 +134,10 @@ pub fn train(options: &Options, session: &Session) -> Result<Finished, Error> {
     let run = run_file(options, &config, &training, origin, walker, &taught)?;
     let seconds = began.elapsed().as_secs_f64();
     let totals = Totals { evaluations: 1, simulated: log.simulated as u64, seconds, ..Totals::default() };
-    let csv = run.to_csv();
     let mut metrics = Metrics::open(folder.path(), 0)?;
     metrics.write(0, &run.stats, &totals)?;
     metrics.flush()?;
-    write(ELITES, &csv)?;
-    write(RUN_JSON, run.to_json().as_bytes())?;
+    folder.write_run(&run)?;
     let archive = folder.path().join(RUN_JSON);
     let validated = match config.validation.best {
         0 => Some(Vec::new()),
@@ -199,26 +188,11 @@ fn run_file(
         genome,
     };
     robot.cell = robot.bins();
-    let dimensions = Dimensions::of(config)?;
     let space = DescriptorSpace::voxel_counts(grouping.tasks().len());
     let cell = space.index(&robot.cell).expect("bins of voxel counts are a cell of one task's archive");
     let mut archive = Archive::new();
     let elite = Elite { cell, objective: robot.objective, solution: robot };
     archive.insert(elite).map_err(|error| Error::other(error.to_string()))?;
-    let stats = archive.stats(dimensions.possible_cells, config.archive.qd_offset);
-    Ok(RunFile {
-        format: FORMAT.to_string(),
-        format_version: FORMAT_VERSION,
-        program_version: env!("CARGO_PKG_VERSION").to_string(),
-        name: options.name.clone(),
-        config: config.clone(),
-        dataset: training.dataset.clone(),
-        training_images,
-        dimensions,
-        origin: Some(origin),
-        generations: 1,
-        stats,
-        elites: archive.elites().map(|elite| elite.solution.clone()).collect(),
-        read_sha256: None,
-    })
+    let data = (&training.dataset, training_images);
+    Ok(RunFile { origin: Some(origin), ..RunFile::new(&options.name, config, data, 1, &archive)? })
 }

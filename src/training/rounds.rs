@@ -84,6 +84,15 @@ pub struct Round {
     pub rollouts: usize,
 }
 
+/// The beginning of a training.
+#[derive(Clone, Debug, PartialEq)]
+pub enum First {
+    /// The results of the first round.
+    Round(Round),
+    /// Mean clipped margin of the robot's own design, where there are no rounds.
+    Own(f64),
+}
+
 /// A trained design.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Taught {
@@ -190,6 +199,17 @@ impl<'a> Teacher<'a> {
         self.predicted
     }
 
+    /// Begins: with the first round, or, without rounds, with the robot's own design.
+    ///
+    /// # Errors
+    /// Returns the error of the rollouts.
+    pub fn first<R: Rollouts>(&mut self, rollouts: &mut R) -> Result<First, R::Error> {
+        match self.plan.rounds {
+            0 => self.own(rollouts).map(First::Own),
+            _ => self.round(rollouts).map(First::Round),
+        }
+    }
+
     /// Measures the response around the design, and solves the design problem again.
     ///
     /// # Errors
@@ -218,7 +238,7 @@ impl<'a> Teacher<'a> {
     ///
     /// # Errors
     /// Returns the error of the rollouts.
-    pub fn own<R: Rollouts>(&mut self, rollouts: &mut R) -> Result<f64, R::Error> {
+    fn own<R: Rollouts>(&mut self, rollouts: &mut R) -> Result<f64, R::Error> {
         self.design = self.gait.design();
         let (measured, _) = self.measured(&mut self.random(Use::Round, 0), rollouts)?;
         if measured < 0.0 {

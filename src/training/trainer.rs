@@ -7,7 +7,6 @@ use crate::base::remedy::Remedy;
 use crate::base::session::Session;
 use crate::base::text::counted;
 use crate::config::Config;
-use crate::config::train::TrainConfig;
 use crate::data::dataset::{Dataset, Split};
 use crate::images::training::Training;
 use crate::images::whereabouts::see;
@@ -22,7 +21,7 @@ use crate::task::perturbation::Condition;
 use crate::training::gaits::Walker;
 use crate::training::log::{Kept, Log, stopped};
 use crate::training::race::Challenge;
-use crate::training::rounds::{Image, Plan, Round, Taught, Teacher};
+use crate::training::rounds::{First, Image, Plan, Round, Taught, Teacher};
 use crate::training::window::{Found, Windows};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -61,7 +60,7 @@ impl Trainer<'_> {
         session: &Session,
     ) -> Result<Config, Error> {
         let Trainer { config, training, .. } = self;
-        let (count, robot) = (config.train.windows, &walker.robot.id);
+        let (count, robot) = (config.train.windows_tried(), &walker.robot.id);
         let mut with = (*config).clone();
         with.train.windows = 0;
         if count == 0 {
@@ -122,25 +121,22 @@ impl Trainer<'_> {
             log.begins(format!("{robot}: response:"), self.config.train.random_images);
             let Some(response) = self.response(gait, measured, log)? else { continue };
             report_response(session, &walker.robot.id, gait, &response);
-            let seeing = match plan.rounds {
-                // It keeps its own sensors, which suit the images in its own window.
-                0 => Config { train: TrainConfig { windows: 0, ..config.train }, ..(*config).clone() },
-                _ => self.with_window(walker, &response, log, session)?,
-            };
+            let seeing = self.with_window(walker, &response, log, session)?;
             let images = self.images(gait, &seeing)?;
             let mut teacher = Teacher::new(gait, &response, images, plan, &config.physics);
             let conditions = probing.conditions();
             log.begins_round(robot, 1, &plan);
             let mut rollouts = Kept { config, conditions, log };
-            if plan.rounds == 0 {
-                let fitness = teacher.own(&mut rollouts)?;
-                report_own(session, &walker.robot.id, fitness);
-                best = Some((walker, seeing, teacher));
-                break;
+            match teacher.first(&mut rollouts)? {
+                First::Round(round) => report_round(session, robot, &round, &plan),
+                First::Own(fitness) => report_own(session, robot, fitness),
             }
-            report_round(session, &walker.robot.id, &teacher.round(&mut rollouts)?, &plan);
             if best.as_ref().is_none_or(|(_, _, best)| teacher.predicted() > best.predicted()) {
                 best = Some((walker, seeing, teacher));
+            }
+            if plan.rounds == 0 {
+                // Predictions of designs that nothing has changed rank no robots.
+                break;
             }
         }
         let Some((walker, seeing, mut teacher)) = best else {
