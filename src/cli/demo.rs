@@ -8,6 +8,7 @@ use crate::cli::values::{seed, threads};
 use crate::cli::{Resources, in_session};
 use crate::cli::{replay_best, test};
 use crate::commands::replay::Shown;
+use crate::commands::train;
 use crate::commands::{eval, replay};
 use crate::data::builtin::BuiltinDigits;
 use crate::data::dataset::{Dataset, Split};
@@ -19,7 +20,6 @@ use crate::store::folder::IfExists;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{EVAL_JSON, RUN_JSON};
 use crate::task::answer::THRESHOLD;
-use crate::training;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -71,7 +71,7 @@ pub(super) struct DemoArgs {
 }
 
 pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
-    let options = training::Options {
+    let options = train::Options {
         archive: folder::first_run(PathBuf::from(gallery::GAITS)).map_err(Error::other)?,
         robots: Selection::Ids(vec![BEST.to_string()]),
         groups: [vec![0], vec![1]].into(),
@@ -83,7 +83,7 @@ pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
     };
     let with = Resources::of(args.threads, None);
     let finished =
-        in_session(console, with.clone(), |session| training::train(&options, session)).map_err(|error| {
+        in_session(console, with.clone(), |session| train::train(&options, session)).map_err(|error| {
             match error.kind {
                 ErrorKind::Stopped => error.remedy(Remedy::Repeat),
                 _ => error,
@@ -124,6 +124,7 @@ mod tests {
     use crate::store::names::RESPONSE_JSON;
     use crate::store::response::ResponseFile;
     use crate::store::run::StoredRun;
+    use crate::training;
 
     #[test]
     fn the_response_that_ships_with_the_gaits_is_what_the_training_begins_with() {

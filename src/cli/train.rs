@@ -11,17 +11,18 @@ use crate::cli::output::{summary, verdicts};
 use crate::cli::values::{seed, threads};
 use crate::cli::{Resources, in_session};
 use crate::commands::audit;
+use crate::commands::evolve;
+use crate::commands::train;
+use crate::commands::train::{Finished, Options};
 use crate::config::audit::Criteria;
 use crate::images::whereabouts::Whereabouts;
 use crate::robots::selection::Selection;
-use crate::search::evolve;
 use crate::shipped;
 use crate::store::folder;
 use crate::store::folder::IfExists;
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
 use crate::task::grouping::{Groups, groups_text};
 use crate::training;
-use crate::training::{Finished, Options};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -149,7 +150,7 @@ pub(super) fn after_evolution(evolution: &evolve::Options, session: &Session) ->
 /// Trains, validates and audits, and reports the results.
 pub(super) fn trained(options: &Options, with: Resources, console: &Console) -> Result<(), Error> {
     choice::say_simulated([&options.archive], console);
-    let finished = in_session(console, with.clone(), |session| training::train(options, session))?;
+    let finished = in_session(console, with.clone(), |session| train::train(options, session))?;
     let Finished { validated, .. } = &finished;
     summary::training(console, &finished, &options.out);
     let Some(validated) = validated else {

@@ -7,6 +7,7 @@ pub mod capacity;
 pub mod collect;
 pub mod data;
 pub mod eval;
+pub mod evolve;
 pub mod plan;
 #[cfg(feature = "figures")]
 pub mod plot;
@@ -19,3 +20,4 @@ pub mod sweep;
 pub mod table;
 pub mod tasks;
 pub mod team;
+pub mod train;

@@ -1,164 +1,25 @@
-//! `morphcog evolve`: resumable MAP-Elites over bodies, with the same bits however it is run.
+//! The loop of evolution: ask, vary, score, tell.
 
 use crate::base::error::{Error, ErrorKind};
 use crate::base::observer::Generation;
 use crate::base::random::{Purpose, stream};
-use crate::base::remedy::{Invocation, Remedy};
 use crate::base::session::Session;
 use crate::base::stop::Stopped;
 use crate::body::Body;
 use crate::config::Config;
-use crate::data::dataset::Split;
 use crate::genome::{BodySpec, Genome, GenomeError, MutationParams};
-use crate::images::held_out;
 use crate::images::training::Training;
-use crate::images::whereabouts;
-use crate::images::whereabouts::Whereabouts;
 use crate::qd::{ArchiveStats, DescriptorSpace, Evaluated, MapElites, Proposal, Variation};
-use crate::search::{resume, validation};
 use crate::store::checkpoint;
 use crate::store::checkpoint::{Checkpoint, KnownBodies};
-use crate::store::folder::{IfExists, RunFolder};
+use crate::store::folder::RunFolder;
 use crate::store::metrics::{Metrics, Totals};
-use crate::store::names::{METRICS, RUN_JSON, TRAINING_JSON};
 use crate::store::run::{Dimensions, Robot, RunFile};
-use crate::store::validation::Validated;
 use crate::task::evaluation::{Evaluation, Job, Outcome, evaluate};
 use crate::task::grouping::Grouping;
 use rayon::prelude::*;
-use std::path::PathBuf;
+use std::path::Path;
 use std::time::{Duration, Instant};
-
-/// The config of a run, and its output folder.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// Everything that the result depends on.
-    pub config: Config,
-    /// Name of the run.
-    pub name: String,
-    /// Its folder.
-    pub out: PathBuf,
-    /// Action if the folder already has a run.
-    pub if_exists: IfExists,
-}
-
-/// The result of a session.
-#[derive(Clone, Debug)]
-pub struct Finished {
-    /// The run as written to `run.json`.
-    pub run: RunFile,
-    /// Counts of the whole run.
-    pub totals: Totals,
-    /// Height and width of the training images.
-    pub size: [usize; 2],
-    /// Best robots of each task on validation images, best first; empty if the config wants none,
-    /// or if it was stopped.
-    pub validated: Vec<Validated>,
-    /// True if a signal stopped the run before its last generation, or before the choice of robots.
-    pub stopped: bool,
-    /// Error that kept the last state from being fully written; the run resumes from its last
-    /// checkpoint.
-    pub unwritten: Option<Error>,
-}
-
-impl Finished {
-    /// Returns the id of the best robot on validation images or, without validation, the fittest.
-    pub fn best(&self) -> Option<&str> {
-        let better = |a: &Validated, b: &Validated| a.balanced_accuracy > b.balanced_accuracy;
-        let first =
-            self.validated.iter().reduce(|best, other| if better(other, best) { other } else { best });
-        first.map(|robot| robot.id.as_str()).or(self.run.best().map(|robot| robot.id.as_str()))
-    }
-}
-
-/// Runs a config or resumes a run, then chooses robots on validation images if configured. If
-/// `stop` is set, it drops the current generation and saves the state before it.
-///
-/// # Errors
-/// Returns an error if config, data or folder is unsuitable. No existing results are lost.
-pub fn evolve(options: &Options, session: &Session) -> Result<Finished, Error> {
-    let config = &options.config;
-    let resumes = options.if_exists == IfExists::Resume;
-    // Check everything that can be known before anything is written.
-    if resumes && options.out.join(TRAINING_JSON).exists() {
-        let text = format!("{}: the run in this folder is a training", options.out.display());
-        return Err(Error::occupied(text)
-            .remedy(Remedy::Run(Invocation::new("train").switch("resume", true), "goes on with it")));
-    }
-    let whereabouts =
-        Whereabouts::given(session.folder()).and_of_resumed(options.if_exists, &options.out.join(RUN_JSON));
-    let dataset = whereabouts.load(&config.data, &[Split::Train])?;
-    whereabouts::say_transposed(&dataset, &config.data, session);
-    let size = dataset.size(Split::Train).expect("its training images were loaded just now");
-    let training = Training::of(config, &dataset)?;
-    held_out::check(config, &[], "data.images_per_class", &dataset)?;
-    let mutations =
-        Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome, session };
-    let first = mutations.random_immigrant(0, 0).map_err(unmade);
-    // Only the leading rank has a folder.
-    let ranks = session.ranks;
-    let open = || RunFolder::open(&options.out, options.if_exists, session);
-    let opened = first.and_then(|_| ranks.leads().then(open).transpose());
-    // Every rank must vote, or the others block.
-    let is_stopped = matches!(&opened, Err(error) if error.kind == ErrorKind::Stopped);
-    if !ranks.all(!is_stopped) {
-        return Err(Stopped.into());
-    }
-    let folder = opened?;
-    let saved = match &folder {
-        Some(folder) if resumes => {
-            resume::saved(folder, config, &training, |text| session.observer.warning(&text))?
-        }
-        _ => None,
-    };
-    let saved = ranks.from_lead(saved);
-    if let Some(folder) = &folder {
-        folder.write_config(config)?;
-        whereabouts::remember(folder, &dataset)?;
-    }
-    let pool = session.pool()?;
-    let mut run = Run::new(options, session, training, saved)?;
-    let mut files = match folder {
-        Some(folder) => Some(Files { metrics: metrics(&folder, run.generation, session)?, folder }),
-        None => None,
-    };
-    pool.install(|| run.evolve(&mutations, &mut files, session)).map_err(goes_on)?;
-    let (file, totals) = (run.file(), run.totals());
-    let is_whole = run.generation >= config.generations;
-    let Some(mut files) = files else {
-        return Ok(Finished {
-            run: file,
-            totals,
-            size,
-            validated: Vec::new(),
-            stopped: !is_whole,
-            unwritten: None,
-        });
-    };
-    let unwritten = files.save(&run).err().map(goes_on);
-    // If the run was not written, robots would be chosen from an older run.json.
-    let chooses = is_whole && unwritten.is_none() && config.validation.best > 0 && !file.elites.is_empty();
-    let validated = match chooses {
-        true => {
-            let archive = files.folder.path().join(RUN_JSON);
-            validation::at_end(&archive, &dataset, session)?
-        }
-        false => Some(Vec::new()),
-    };
-    let stopped = !is_whole || validated.is_none();
-    let validated = validated.unwrap_or_default();
-    Ok(Finished { run: file, totals, size, validated, stopped, unwritten })
-}
-
-/// Opens the run's metrics.csv to continue after a generation.
-fn metrics(folder: &RunFolder, generation: u64, session: &Session) -> Result<Metrics, Error> {
-    let metrics = Metrics::open(folder.path(), generation)?;
-    if metrics.missing > 0 {
-        let (path, missing) = (folder.path().join(METRICS).display().to_string(), metrics.missing);
-        session.observer.warning(&format!("{path}: {missing} of {generation} generations are missing in it"));
-    }
-    Ok(metrics)
-}
 
 /// Interval at which lines of `metrics.csv` reach the file, for those who watch it.
 const FLUSH_EVERY: Duration = Duration::from_secs(1);
@@ -168,30 +29,23 @@ const FLUSH_EVERY: Duration = Duration::from_secs(1);
 const MOST_SHARE: u32 = 50;
 
 /// The output files of a run.
-struct Files {
-    folder: RunFolder,
-    metrics: Metrics,
+pub(crate) struct Files {
+    pub(crate) folder: RunFolder,
+    pub(crate) metrics: Metrics,
 }
 
 impl Files {
     /// Writes metrics, checkpoint, `run.json` and `elites.csv`.
-    fn save(&mut self, run: &Run) -> Result<(), Error> {
+    pub(crate) fn save(&mut self, run: &Run) -> Result<(), Error> {
         self.metrics.flush()?;
         run.save(&self.folder)
     }
 }
 
-/// Adds the advice to resume to an error of a full disk.
-fn goes_on(error: Error) -> Error {
-    match error.kind == ErrorKind::Other && !error.remedies.is_empty() {
-        true => error.remedy(Remedy::RepeatResuming),
-        false => error,
-    }
-}
-
-struct Run<'a> {
-    options: &'a Options,
-    session: &'a Session<'a>,
+pub(crate) struct Run<'a> {
+    config: &'a Config,
+    name: &'a str,
+    pub(crate) session: &'a Session<'a>,
     training: Training,
     grouping: Grouping,
     space: DescriptorSpace,
@@ -200,7 +54,7 @@ struct Run<'a> {
     known: KnownBodies,
     totals: Totals,
     /// Generations completed.
-    generation: u64,
+    pub(crate) generation: u64,
     began: Instant,
 }
 
@@ -208,13 +62,12 @@ struct Run<'a> {
 type Child = (u64, Option<usize>, Robot);
 
 impl<'a> Run<'a> {
-    fn new(
-        options: &'a Options,
+    pub(crate) fn new(
+        (config, name): (&'a Config, &'a str),
         session: &'a Session,
         training: Training,
         saved: Option<Checkpoint>,
     ) -> Result<Self, Error> {
-        let config = &options.config;
         let (archive, known, totals, generation) = match saved {
             Some(Checkpoint { run, totals, known_bodies }) => {
                 (run.archive()?, known_bodies, totals, run.generations)
@@ -223,7 +76,8 @@ impl<'a> Run<'a> {
         };
         let grouping = config.grouping()?.with_fitness(config.evaluation.fitness);
         Ok(Run {
-            options,
+            config,
+            name,
             session,
             training,
             space: DescriptorSpace::voxel_counts(grouping.tasks().len()),
@@ -237,17 +91,21 @@ impl<'a> Run<'a> {
         })
     }
 
+    /// Says what begins in a folder.
+    pub(crate) fn beginning(&self, out: &Path) -> String {
+        let verb = if self.generation > 0 { "going on with" } else { "evolving in" };
+        let (out, dataset) = (out.display(), &self.training.dataset.name);
+        format!("{verb} {out}; images from {dataset}: {}", self.training.listed())
+    }
+
     /// Repeats ask, evaluate, tell. A stopped generation leaves the run as it was before.
-    fn evolve(
+    pub(crate) fn evolve(
         &mut self,
         mutations: &Mutations,
         files: &mut Option<Files>,
         session: &Session,
     ) -> Result<(), Error> {
-        let config = &self.options.config;
-        let verb = if self.generation > 0 { "going on with" } else { "evolving in" };
-        let (out, dataset) = (self.options.out.display(), &self.training.dataset.name);
-        session.observer.note(&format!("{verb} {out}; images from {dataset}: {}", self.training.listed()));
+        let config = self.config;
         session.observer.generation(&self.progress());
         let every = Duration::try_from_secs_f64(config.checkpoint.seconds).unwrap_or(Duration::MAX);
         if let Some(files) = files.as_mut().filter(|_| self.generation == 0) {
@@ -314,7 +172,7 @@ impl<'a> Run<'a> {
 
     /// Returns the children to evaluate, and the keys of the bodies that are new.
     fn unknown(&mut self, children: Vec<Child>) -> (Vec<Child>, Vec<[u8; 16]>) {
-        let config = &self.options.config;
+        let config = self.config;
         let objective = config.objective();
         let saves_known = config.savings.known_bodies || !objective.may_repeat();
         let (mut fresh, mut new) = (Vec::new(), Vec::new());
@@ -333,7 +191,7 @@ impl<'a> Run<'a> {
 
     /// Shows the training images to what is simulated for children.
     fn scored(&self, children: &[Child], session: &Session) -> Result<Vec<Evaluation>, Error> {
-        let config = &self.options.config;
+        let config = self.config;
         let Training { stimuli, conditions, .. } = &self.training;
         let simulated = |(_, _, robot): &'_ Child| config.objective().simulated(&robot.body).into_owned();
         let bodies: Vec<Body> = children.iter().map(simulated).collect();
@@ -374,7 +232,7 @@ impl<'a> Run<'a> {
             }
         }
         self.search.tell(told).map_err(|error| Error::other(error.to_string()))?;
-        if let Some(keep) = self.options.config.archive.keep {
+        if let Some(keep) = self.config.archive.keep {
             self.search.retain_fittest(keep, |robot| robot.task.clone());
         }
         Ok(())
@@ -389,7 +247,7 @@ impl<'a> Run<'a> {
         thresholds: &[Option<f64>],
     ) -> Job<'b> {
         let (archive, training, grouping) = (self.search.archive(), &self.training, &self.grouping);
-        let objective = self.options.config.objective();
+        let objective = self.config.objective();
         let factor = objective.factor(&robot.body);
         let bins = robot.bins();
         let to_beat = |task: usize| {
@@ -422,7 +280,7 @@ impl<'a> Run<'a> {
         let coordinates = self.cell(robot.bins(), score.task);
         let cell = self.space.index(&coordinates).expect("the coordinates are bins of this very space");
         let task = self.grouping.tasks()[score.task].name();
-        let objective = self.options.config.objective().factor(&robot.body) * score.fitness;
+        let objective = self.config.objective().factor(&robot.body) * score.fitness;
         let solution = Robot { cell: coordinates, task, objective, displacements, ..robot };
         let is_in = thresholds[score.task].is_none_or(|threshold| objective > threshold);
         is_in.then_some(Evaluated { child, cell, objective, solution })
@@ -432,7 +290,7 @@ impl<'a> Run<'a> {
     /// are kept or there are fewer. It never decreases, so a robot at or below it can never enter
     /// later: early stop and known bodies stay lossless.
     fn admission_thresholds(&self) -> Vec<Option<f64>> {
-        let keep = self.options.config.archive.keep;
+        let keep = self.config.archive.keep;
         let last = |name: String| self.search.archive().nth_fittest(keep?, |robot| robot.task == name);
         self.grouping.tasks().iter().map(|task| last(task.name())).collect()
     }
@@ -444,7 +302,7 @@ impl<'a> Run<'a> {
     }
 
     /// Returns the counts so far, including the time of this session.
-    fn totals(&self) -> Totals {
+    pub(crate) fn totals(&self) -> Totals {
         Totals { seconds: self.totals.seconds + self.began.elapsed().as_secs_f64(), ..self.totals }
     }
 
@@ -452,7 +310,7 @@ impl<'a> Run<'a> {
         let stats = self.stats();
         Generation {
             done: self.generation,
-            total: self.options.config.generations,
+            total: self.config.generations,
             best: stats.obj_max,
             coverage: stats.coverage,
             evaluations: self.totals.evaluations,
@@ -460,11 +318,11 @@ impl<'a> Run<'a> {
     }
 
     fn stats(&self) -> ArchiveStats {
-        self.search.archive().stats(self.dimensions.possible_cells, self.options.config.archive.qd_offset)
+        self.search.archive().stats(self.dimensions.possible_cells, self.config.archive.qd_offset)
     }
 
     /// Writes checkpoint, `run.json` and `elites.csv`.
-    fn save(&self, folder: &RunFolder) -> Result<(), Error> {
+    pub(crate) fn save(&self, folder: &RunFolder) -> Result<(), Error> {
         let checkpoint =
             Checkpoint { run: self.file(), totals: self.totals(), known_bodies: self.known.clone() };
         checkpoint::write(folder.path(), &checkpoint)?;
@@ -472,8 +330,8 @@ impl<'a> Run<'a> {
     }
 
     /// Returns the run in its current state.
-    fn file(&self) -> RunFile {
-        let Options { name, config, .. } = self.options;
+    pub(crate) fn file(&self) -> RunFile {
+        let Run { name, config, .. } = self;
         let data = (&self.training.dataset, self.training.images.clone());
         RunFile::new(name, config, data, self.generation, self.search.archive())
             .expect("the tasks of the config were read when the run began")
@@ -481,12 +339,12 @@ impl<'a> Run<'a> {
 }
 
 /// Random immigrants and mutated offspring, each from a random stream of its own.
-struct Mutations<'a> {
-    seed: u64,
-    spec: BodySpec,
-    params: &'a MutationParams,
+pub(crate) struct Mutations<'a> {
+    pub(crate) seed: u64,
+    pub(crate) spec: BodySpec,
+    pub(crate) params: &'a MutationParams,
     /// Makes no more robots once it is stopped.
-    session: &'a Session<'a>,
+    pub(crate) session: &'a Session<'a>,
 }
 
 /// Returns a robot without results.
@@ -506,7 +364,7 @@ fn unevaluated((genome, body): (Genome, Body), generation: u64, parent: Option<&
 }
 
 /// Converts the error of a robot that could not be made.
-fn unmade(error: GenomeError) -> Error {
+pub(crate) fn unmade(error: GenomeError) -> Error {
     match error {
         GenomeError::Stopped(stopped) => stopped.into(),
         error => Error::input(format!("body: {error}")),

@@ -22,13 +22,13 @@ use crate::task::protocol::{Protocol, RolloutMode};
 use std::collections::BTreeSet;
 
 /// A candidate gait and the robot it belongs to.
-pub(super) struct Walker<'a> {
-    pub(super) robot: &'a Robot,
-    pub(super) gait: Gait,
+pub(crate) struct Walker<'a> {
+    pub(crate) robot: &'a Robot,
+    pub(crate) gait: Gait,
 }
 
 /// Returns the origin of the gaits, with the images they were trained on; those cannot validate.
-pub(super) fn origin(source: &StoredRun, config: &Config, dataset: &Dataset) -> Result<Origin, Error> {
+pub(crate) fn origin(source: &StoredRun, config: &Config, dataset: &Dataset) -> Result<Origin, Error> {
     let run = &source.run;
     let sha256 = dataset.fingerprint(Split::Train).expect("a training loads its training images");
     let all = run.origin.as_ref().map_or(Vec::new(), |origin| origin.elsewhere.clone());
@@ -57,7 +57,7 @@ pub(super) fn origin(source: &StoredRun, config: &Config, dataset: &Dataset) -> 
     })
 }
 
-pub(super) fn walkers<'a>(
+pub(crate) fn walkers<'a>(
     source: &'a StoredRun,
     robots: &Selection,
     train: &TrainConfig,
@@ -87,7 +87,7 @@ pub(super) fn walkers<'a>(
 
 /// Returns the rollouts of each gait that `morphcog response` measured, to save simulating them
 /// again. They are empty unless a file beside the run is valid for this training.
-pub(super) fn measured(
+pub(crate) fn measured(
     source: &StoredRun,
     config: &Config,
     probing: &Probing,
@@ -110,7 +110,7 @@ pub(super) fn measured(
 }
 
 /// Hashes all that rollouts depend on, but not the challengers: more of them only add rollouts.
-pub(super) fn key(config: &Config, seed_of_gaits: u64, walkers: &[Walker], training: &Training) -> String {
+pub(crate) fn key(config: &Config, seed_of_gaits: u64, walkers: &[Walker], training: &Training) -> String {
     let bodies: Vec<String> = walkers.iter().map(|walker| walker.robot.body.to_string()).collect();
     let images: Vec<usize> = training.images.iter().map(|image| image.index).collect();
     let train = TrainConfig { challengers: 0, ..config.train };

@@ -26,24 +26,24 @@ const SAVE_EVERY: Duration = Duration::from_secs(5);
 const PART: usize = 128;
 
 /// The rollouts simulated in this session and in earlier ones.
-pub(super) struct Log<'a> {
+pub(crate) struct Log<'a> {
     path: PathBuf,
     key: String,
     batches: Vec<Batch>,
     /// Batches requested so far; `simulated` counts their rollouts.
     asked: usize,
-    pub(super) simulated: usize,
+    pub(crate) simulated: usize,
     /// Number of rollouts in the file, and the time it was written.
     saved: (usize, Instant),
     /// Rollouts completed in the current work; `None` if its progress has another unit.
     done: Option<AtomicU64>,
     /// True if anything was simulated since the last check.
-    pub(super) has_simulated: Arc<AtomicBool>,
-    pub(super) session: &'a Session<'a>,
+    pub(crate) has_simulated: Arc<AtomicBool>,
+    pub(crate) session: &'a Session<'a>,
 }
 
 impl<'a> Log<'a> {
-    pub(super) fn open(path: PathBuf, key: String, session: &'a Session<'a>) -> Result<Self, Error> {
+    pub(crate) fn open(path: PathBuf, key: String, session: &'a Session<'a>) -> Result<Self, Error> {
         let mut batches = Vec::new();
         if path.exists() {
             let name = path.display().to_string();
@@ -68,13 +68,13 @@ impl<'a> Log<'a> {
     }
 
     /// Starts work whose progress is counted in rollouts.
-    pub(super) fn begins(&mut self, label: String, rollouts: usize) {
+    pub(crate) fn begins(&mut self, label: String, rollouts: usize) {
         self.session.observer.begins(&Work::new(label, rollouts as u64, "rollouts"));
         self.done = Some(AtomicU64::new(0));
     }
 
     /// Starts a round or, if the plan has none, the evaluation of the robot as it is.
-    pub(super) fn begins_round(&mut self, robot: &str, number: usize, plan: &Plan) {
+    pub(crate) fn begins_round(&mut self, robot: &str, number: usize, plan: &Plan) {
         match plan.rounds {
             0 => self.begins(format!("{robot}: as it is:"), plan.images),
             rounds => self.begins(format!("{robot}: round {number} of {rounds}:"), plan.images),
@@ -82,7 +82,7 @@ impl<'a> Log<'a> {
     }
 
     /// Starts work whose progress is counted in challengers.
-    pub(super) fn begins_challenges(&mut self, challengers: usize) {
+    pub(crate) fn begins_challenges(&mut self, challengers: usize) {
         self.session.observer.begins(&Work::new("refining:".to_string(), challengers as u64, "challengers"));
         self.done = None;
     }
@@ -99,7 +99,7 @@ impl<'a> Log<'a> {
     }
 
     /// Returns the rollouts of a body under stimuli and conditions; the first are `known`.
-    pub(super) fn rollouts(
+    pub(crate) fn rollouts(
         &mut self,
         body: &Body,
         (stimuli, conditions): (&[Grid<f64>], &[Condition]),
@@ -146,7 +146,7 @@ impl<'a> Log<'a> {
         Ok(self.batches[number].clone())
     }
 
-    pub(super) fn save(&mut self) -> Result<(), Error> {
+    pub(crate) fn save(&mut self) -> Result<(), Error> {
         let rollouts = count(&self.batches);
         if self.saved.0 == rollouts && self.path.exists() {
             return Ok(());
@@ -163,15 +163,15 @@ fn count(batches: &[Batch]) -> usize {
     batches.iter().map(Vec::len).sum()
 }
 
-pub(super) fn stopped() -> Error {
+pub(crate) fn stopped() -> Error {
     Error::stopped("stopped; what was simulated is saved".to_string()).remedy(Remedy::RepeatResuming)
 }
 
 /// Rollouts that are recorded in the log.
-pub(super) struct Kept<'a, 'b> {
-    pub(super) config: &'a Config,
-    pub(super) conditions: &'a [Condition],
-    pub(super) log: &'a mut Log<'b>,
+pub(crate) struct Kept<'a, 'b> {
+    pub(crate) config: &'a Config,
+    pub(crate) conditions: &'a [Condition],
+    pub(crate) log: &'a mut Log<'b>,
 }
 
 impl Rollouts for Kept<'_, '_> {

@@ -26,13 +26,13 @@ use crate::training::window::{Found, Windows};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-pub(super) struct Trainer<'a> {
-    pub(super) config: &'a Config,
-    pub(super) dataset: &'a Dataset,
-    pub(super) training: &'a Training,
-    pub(super) probing: Probing,
+pub(crate) struct Trainer<'a> {
+    pub(crate) config: &'a Config,
+    pub(crate) dataset: &'a Dataset,
+    pub(crate) training: &'a Training,
+    pub(crate) probing: Probing,
     /// Displacements of each gait with random images that were known beforehand.
-    pub(super) measured: Vec<Batch>,
+    pub(crate) measured: Vec<Batch>,
 }
 
 impl Trainer<'_> {
@@ -107,7 +107,7 @@ impl Trainer<'_> {
     }
 
     /// Trains all gaits for one round, then continues with the one that has the best prediction.
-    pub(super) fn train<'w>(
+    pub(crate) fn train<'w>(
         &self,
         walkers: &'w [Walker<'w>],
         log: &mut Log,

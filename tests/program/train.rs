@@ -3,17 +3,17 @@
 
 use crate::common::program::{Made, Sandbox, TINY, files, gaits, write_images};
 use morphcog::base::session::Session;
+use morphcog::commands::evolve;
+use morphcog::commands::train;
 use morphcog::config::Config;
 use morphcog::data::dataset::Split;
 use morphcog::images::training::Training;
 use morphcog::images::whereabouts::load_dataset;
 use morphcog::response::gait::Gait;
 use morphcog::robots::selection::Selection;
-use morphcog::search::evolve;
 use morphcog::store::folder::IfExists;
 use morphcog::store::images::ImageRef;
 use morphcog::store::run::{Robot, RunFile};
-use morphcog::training;
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
 use std::collections::BTreeSet;
@@ -505,7 +505,7 @@ fn made_by(config: &str, groups: &str) -> usize {
     if read("any").elites.is_empty() {
         return 1;
     }
-    let options = training::Options {
+    let options = train::Options {
         archive: sandbox.path("any/run.json"),
         robots: Selection::Top(3),
         groups: groups.parse().unwrap(),
@@ -515,7 +515,7 @@ fn made_by(config: &str, groups: &str) -> usize {
         out: sandbox.path("taught"),
         if_exists,
     };
-    match training::train(&options, &Session::default().threads(Some(1))) {
+    match train::train(&options, &Session::default().threads(Some(1))) {
         Ok(_) => {
             let taught = read("taught");
             Config::load(&sandbox.path("taught/config.toml").to_string_lossy(), &[]).unwrap();

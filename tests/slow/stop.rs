@@ -6,8 +6,8 @@ use crate::common::program::{PROGRAM, Sandbox, TINY, files, gaits, without_secon
 use crate::common::server::Server;
 use morphcog::base::error::ErrorKind;
 use morphcog::base::session::Session;
+use morphcog::commands::evolve::{Options, evolve};
 use morphcog::config::Config;
-use morphcog::search::evolve::{Options, evolve};
 use morphcog::store::folder::IfExists;
 use std::io::Read;
 use std::os::unix::process::ExitStatusExt;

@@ -11,16 +11,16 @@ use crate::cli::output::console::{Console, Mode};
 use crate::cli::output::networks;
 use crate::commands::bench::Speed;
 use crate::commands::data::Found;
+use crate::commands::evolve::Finished;
+use crate::commands::train;
 use crate::data::fetch::{Fetched, Outcome};
 use crate::draw::report::tables::of_robot;
 use crate::robots::published::Published;
-use crate::search::evolve::Finished;
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::{EvalFile, RobotReport};
 use crate::store::images::{HeldOut, ImageRef};
 use crate::store::names::RUN_JSON;
 use crate::store::validation::Validated;
-use crate::training;
 use std::path::Path;
 
 /// The number of robots listed after an evolution.
@@ -102,8 +102,8 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path, goes_on: bo
 }
 
 /// Writes the results of a training.
-pub fn training(console: &Console, finished: &training::Finished, out: &Path) {
-    let training::Finished { run, rollouts, size, .. } = finished;
+pub fn training(console: &Console, finished: &train::Finished, out: &Path) {
+    let train::Finished { run, rollouts, size, .. } = finished;
     let Some(robot) = run.best() else { return };
     if console.mode() == Mode::Json {
         let done = serde_json::json!({

@@ -3,17 +3,18 @@
 use crate::base::error::{Error, ErrorKind};
 use crate::base::remedy::Remedy;
 use crate::base::session::Session;
+use crate::commands::evolve;
 use crate::commands::tasks::task::{Place, Run, Task, selection};
+use crate::commands::train;
 use crate::commands::{audit, eval};
 use crate::robots::selection::Selection;
-use crate::search::{evolve, held_out_run, validation};
+use crate::search::{held_out_run, validation};
 use crate::store::eval::EvalFile;
 use crate::store::folder::IfExists;
 use crate::store::lock::Lock;
 use crate::store::names::{AUDIT_JSON, RUN_JSON, TASK_JSON, TASK_LOCK};
 use crate::store::task::{State, TaskFile};
 use crate::task::answer;
-use crate::training;
 use std::time::Instant;
 
 /// Runs a task, or goes on with it.
@@ -120,7 +121,7 @@ fn steps(task: &Task, place: &Place, session: &Session) -> Result<(), Error> {
             }
         }
         Run::Train(training) => {
-            let options = training::Options {
+            let options = train::Options {
                 archive: training.archive.clone(),
                 robots: selection("robots", &training.robots)?,
                 groups: training.groups.clone(),
@@ -130,7 +131,7 @@ fn steps(task: &Task, place: &Place, session: &Session) -> Result<(), Error> {
                 out: folder.clone(),
                 if_exists: IfExists::Resume,
             };
-            let trained = training::train(&options, session).map_err(|error| match error.kind {
+            let trained = train::train(&options, session).map_err(|error| match error.kind {
                 ErrorKind::Stopped => stopped(),
                 _ => of_task(error),
             })?;

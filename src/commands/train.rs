@@ -1,0 +1,185 @@
+//! `morphcog train`: trains gaits to tell images apart.
+
+use crate::base::error::Error;
+use crate::base::remedy::Remedy;
+use crate::base::session::Session;
+use crate::base::text::counted;
+use crate::config::Config;
+use crate::data::dataset::Split;
+use crate::images::training::Training;
+use crate::images::whereabouts;
+use crate::images::whereabouts::Whereabouts;
+use crate::qd::{Archive, DescriptorSpace, Elite};
+use crate::response::probing::Probing;
+use crate::robots::selection::{Selection, VALIDATED};
+use crate::search::validation;
+use crate::store::folder::{IfExists, RunFolder};
+use crate::store::images::ImageRef;
+use crate::store::metrics::{Metrics, Totals};
+use crate::store::names::{RUN_JSON, TRAINING_JSON};
+use crate::store::run::StoredRun;
+use crate::store::run::{Robot, RunFile};
+use crate::store::training::Origin;
+use crate::store::validation::Validated;
+use crate::task::grouping::Groups;
+use crate::training::gaits::{Walker, key, measured, origin, walkers};
+use crate::training::log::Log;
+use crate::training::rounds::Taught;
+use crate::training::trainer::Trainer;
+use crate::training::{check_groups, config_of, sized, with_images};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// The gaits to train, the task, and the output folder.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Path of the run.json with the gaits.
+    pub archive: PathBuf,
+    /// Robots whose gaits are tried; the one with the best prediction is trained.
+    pub robots: Selection,
+    /// The two groups of classes.
+    pub groups: Groups,
+    /// Seed of all random numbers; `None`: that of the run.
+    pub seed: Option<u64>,
+    /// Config keys that differ from those of the run, as `train.rounds=10`.
+    pub set: Vec<String>,
+    /// Name of the new run.
+    pub name: String,
+    /// Its folder.
+    pub out: PathBuf,
+    /// Action if the folder already has a run.
+    pub if_exists: IfExists,
+}
+
+/// The result of a training.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// The run as written to `run.json`.
+    pub run: RunFile,
+    /// Total number of rollouts simulated, without validation.
+    pub rollouts: usize,
+    /// Height and width of the training images.
+    pub size: [usize; 2],
+    /// Results on validation images; `None` if validation was stopped.
+    pub validated: Option<Vec<Validated>>,
+}
+
+/// Trains a robot and validates it.
+///
+/// # Errors
+/// Returns an error if the archive, an option, the data or the folder is unsuitable, or if it was
+/// stopped ([`IfExists::Resume`] continues it). No existing results are lost.
+pub fn train(options: &Options, session: &Session) -> Result<Finished, Error> {
+    if options.robots.validated().is_some() {
+        let text = "expected another selection: gaits have no task to validate";
+        let error = Error::argument("robots", VALIDATED, text);
+        return Err(error.remedy(Remedy::ChooseRobots(Some("top:4"))));
+    }
+    let source = StoredRun::read(&options.archive)?;
+    let whereabouts = Whereabouts::given(session.folder())
+        .and_of_resumed(options.if_exists, &options.out.join(RUN_JSON))
+        .and_of(&options.archive);
+    let config = config_of(&source.run.config, options.groups.classes(), options.seed, &options.set)?;
+    let dataset = whereabouts.load(&config.data, &[Split::Train])?;
+    check_groups(&options.groups, &dataset)?;
+    whereabouts::say_transposed(&dataset, &config.data, session);
+    let of_gaits = &source.run;
+    let config = sized(config, &of_gaits.dataset, &of_gaits.config, &dataset, &options.set, session);
+    let origin = origin(&source, &config, &dataset)?;
+    let config = with_images(config, &origin.trained_on, &dataset, session)?;
+    let mut training = Training::of(&config, &dataset)?;
+    let classes = training.images.iter().map(|image| image.label);
+    training.conditions = config.train.perturbations.of(classes);
+    let walkers = walkers(&source, &options.robots, &config.train, config.seed)?;
+    // The seed is that of the gaits: a response holds for every task and training seed.
+    let probing = Probing::new(&training.conditions, source.run.config.seed);
+    let measured = measured(&source, &config, &probing, &walkers, session);
+    let [log, run] = [TRAINING_JSON, RUN_JSON].map(|name| options.out.join(name));
+    if options.if_exists == IfExists::Resume && run.exists() && !log.exists() {
+        let text = format!("{}: the run in this folder is no training", options.out.display());
+        return Err(Error::occupied(text).remedy(Remedy::ChooseOut).remedy(Remedy::Replace));
+    }
+    apart(&options.out, &source.path)?;
+    let folder = RunFolder::open(&options.out, options.if_exists, session)?;
+    let key = key(&config, source.run.config.seed, &walkers, &training);
+    let mut log = Log::open(log, key, session)?;
+    folder.write_config(&config)?;
+    whereabouts::remember(&folder, &dataset)?;
+    let pool = session.pool()?;
+    let began = Instant::now();
+    let (gaits, images) = (walkers.len(), training.images.len());
+    session.observer.note(&format!(
+        "training in {}: {}, {images} training images",
+        folder.path().display(),
+        counted(gaits, "gait", "gaits")
+    ));
+    let trainer = Trainer { config: &config, dataset: &dataset, training: &training, probing, measured };
+    let taught = pool.install(|| trainer.train(&walkers, &mut log, session));
+    // Rollouts are saved even after an error.
+    log.save()?;
+    let (walker, config, taught) = taught?;
+    let run = run_file(options, &config, &training, origin, walker, &taught)?;
+    let seconds = began.elapsed().as_secs_f64();
+    let totals = Totals { evaluations: 1, simulated: log.simulated as u64, seconds, ..Totals::default() };
+    let mut metrics = Metrics::open(folder.path(), 0)?;
+    metrics.write(0, &run.stats, &totals)?;
+    metrics.flush()?;
+    folder.write_run(&run)?;
+    let archive = folder.path().join(RUN_JSON);
+    let validated = match config.validation.best {
+        0 => Some(Vec::new()),
+        _ => validation::at_end(&archive, &dataset, session)?,
+    };
+    let size = dataset.size(Split::Train).expect("a training loads its training images");
+    Ok(Finished { run, rollouts: log.simulated, size, validated })
+}
+
+/// Checks that the output folder is not that of the gaits, whose run would be overwritten.
+fn apart(out: &Path, archive: &Path) -> Result<(), Error> {
+    let of_gaits = archive.parent().map(|folder| Path::new(".").join(folder));
+    let [out_now, of_gaits] =
+        [Some(out), of_gaits.as_deref()].map(|folder| folder.and_then(|folder| folder.canonicalize().ok()));
+    if out_now.is_some() && out_now == of_gaits {
+        let text = "expected another folder: the gaits are in this one";
+        return Err(Error::argument("out", out.display(), text));
+    }
+    Ok(())
+}
+
+/// Builds the run file of the trained robot.
+fn run_file(
+    options: &Options,
+    config: &Config,
+    training: &Training,
+    origin: Origin,
+    walker: &Walker,
+    taught: &Taught,
+) -> Result<RunFile, Error> {
+    let body = taught.body.clone();
+    let genome = walker.robot.genome.with_body(&body).map_err(|error| Error::other(error.to_string()))?;
+    let training_images: Vec<ImageRef> = taught.shown.iter().map(|image| training.images[*image]).collect();
+    let grouping = config.grouping()?.with_fitness(config.evaluation.fitness);
+    let answers =
+        crate::store::images::answers(&training_images, taught.displacements.iter().copied().map(Some));
+    let score = grouping.score(&answers);
+    let mut robot = Robot {
+        id: genome.id(),
+        cell: Vec::new(),
+        task: grouping.tasks()[score.task].name(),
+        objective: score.fitness,
+        displacements: taught.displacements.clone(),
+        voxels: body.counts(),
+        generation: 0,
+        parent: Some(walker.robot.id.clone()),
+        body,
+        genome,
+    };
+    robot.cell = robot.bins();
+    let space = DescriptorSpace::voxel_counts(grouping.tasks().len());
+    let cell = space.index(&robot.cell).expect("bins of voxel counts are a cell of one task's archive");
+    let mut archive = Archive::new();
+    let elite = Elite { cell, objective: robot.objective, solution: robot };
+    archive.insert(elite).map_err(|error| Error::other(error.to_string()))?;
+    let data = (&training.dataset, training_images);
+    Ok(RunFile { origin: Some(origin), ..RunFile::new(&options.name, config, data, 1, &archive)? })
+}
