@@ -11,21 +11,26 @@
 //!
 //! | layer | module | contents | begin with |
 //! |---|---|---|---|
-//! | 0 | [`base`] | random streams, hashes, file writes, errors, tables | [`base::error::Error`] |
+//! | 0 | [`base`] | random streams, hashes, file writes, errors, sessions | [`base::session::Session`] |
 //! | 1 | [`body`] | the simulator's bodies and their identities | [`body::Body`] |
+//! | 1 | [`shipped`] | runs that ship with the program or lie in the atlas, by name | [`shipped::gallery`] |
 //! | 2 | [`genome`] | CPPNs and their mutations | [`genome::Genome`] |
 //! | 2 | [`qd`] | archives and MAP-Elites over any type of solution | [`qd::MapElites`] |
 //! | 2 | [`baseline`] | networks that robots are compared with | [`baseline::train`] |
 //! | 2 | [`data`] | the IDX reader, datasets, drawn digits | [`data::dataset::Dataset`] |
-//! | 3 | [`task`] | stimuli, protocols, rollouts, scores | [`task::evaluation`] |
-//! | 4 | [`config`] | everything a run depends on; errors with line and key | [`config::Config`] |
-//! | 5 | [`store`] | the files of a run's folder as plain data | [`store::run::RunFile`] |
-//! | 6 | [`search`] | evolution and the choice of robots by validation | [`search::evolve`] |
-//! | 7 | [`analysis`] | verdicts, votes, the paper's numbers | [`analysis::verdict`] |
-//! | 8 | [`commands`] | one file per command: options in, result out | [`commands::eval`] |
-//! | 9 | [`draw`] | pictures, figures, reports | [`draw::Walk`] |
-//! | 10 | [`serve`] | the page on which the user draws digits, over HTTP | [`serve::Service`] |
-//! | 11 | [`cli`] | the command line and its output | [`cli::Cli`] |
+//! | 3 | [`task`] | stimuli, protocols, rollouts, answers and scores | [`task::evaluation`] |
+//! | 4 | [`response`] | how a gait responds, and what training could reach with it | [`response::gait::Gait`] |
+//! | 5 | [`config`] | everything a run depends on; errors with line and key | [`config::Config`] |
+//! | 6 | [`store`] | the files of a run's folder as plain data | [`store::run::RunFile`] |
+//! | 7 | [`images`] | which images are meant, and what robots see of them | [`images::training::Training`] |
+//! | 8 | [`robots`] | which robots are meant | [`robots::selection::Selection`] |
+//! | 9 | [`search`] | evolution and the choice of robots by validation | [`search::evolve`] |
+//! | 10 | [`training`] | rounds and races that train a gait | [`training::rounds`] |
+//! | 10 | [`analysis`] | verdicts, votes, the paper's numbers | [`analysis::verdict`] |
+//! | 11 | [`draw`] | pictures, figures, reports | [`draw::Walk`] |
+//! | 12 | [`commands`] | one file per command: options in, result out | [`commands::evolve`] |
+//! | 13 | [`serve`] | the page on which the user draws digits, over HTTP | [`serve::Service`] |
+//! | 14 | [`cli`] | the command line and its output | [`cli::Cli`] |
 //!
 //! # A rollout
 //!

@@ -18,7 +18,8 @@ use crate::robots::selection::Selection;
 use crate::search::validation;
 use crate::store::folder;
 use crate::store::names::AUDIT_JSON;
-use crate::store::run::{StoredRun, different};
+use crate::store::run::different;
+use crate::store::stored_run::StoredRun;
 use clap::Args;
 use std::path::{Path, PathBuf};
 

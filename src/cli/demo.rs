@@ -123,7 +123,7 @@ mod tests {
     use crate::response::probing::Probing;
     use crate::store::names::RESPONSE_JSON;
     use crate::store::response::ResponseFile;
-    use crate::store::run::StoredRun;
+    use crate::store::stored_run::StoredRun;
     use crate::training;
 
     #[test]

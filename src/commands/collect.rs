@@ -13,7 +13,7 @@ use crate::store::eval::EvalFile;
 use crate::store::images::HeldOut;
 use crate::store::names::{METRICS, RUN_JSON};
 use crate::store::run::RunFile;
-use crate::store::run::StoredRun;
+use crate::store::stored_run::StoredRun;
 use crate::store::validation::ranking;
 use std::path::PathBuf;
 

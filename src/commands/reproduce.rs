@@ -21,7 +21,7 @@ use crate::store::capacity::CapacityFile;
 use crate::store::eval::EvalFile;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
-use crate::store::run::StoredRun;
+use crate::store::stored_run::StoredRun;
 use crate::task::answer;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -10,7 +10,7 @@ use crate::commands::tasks::{AuditStep, EvalStep, Run, Steps, Task, Training};
 use crate::config::{Config, Settings, flatten, reading};
 use crate::shipped;
 use crate::store::folder::{self, one_run};
-use crate::store::run::StoredRun;
+use crate::store::stored_run::StoredRun;
 use crate::task::grouping::{Groups, groups_text};
 use crate::training;
 use schemars::JsonSchema;

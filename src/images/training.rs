@@ -128,3 +128,95 @@ impl Training {
         answers(&self.images, displacements)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::response::objective::GaitResponse;
+    use crate::sim::Physics;
+    use crate::task::objective::Objective;
+    use crate::task::perturbation::of_response;
+
+    /// Two classes of built-in digits, six images of each.
+    const CONFIG: &str = "[task]\ngroups = [[0], [1]]\n[data]\ndataset = \"builtin\"\nimages_per_class = 6\n";
+
+    fn config(more: &str, set: &[&str]) -> Result<Config, Error> {
+        let set: Vec<String> = set.iter().map(ToString::to_string).collect();
+        Config::parse(&format!("{CONFIG}{more}"), "a.toml", &set)
+    }
+
+    const RESPONSE: &str = "[evaluation]\nfitness = \"response\"\n";
+
+    #[test]
+    fn images_are_pairs_of_opposites_where_training_images_differ_and_the_same_for_the_same_seed() {
+        let images = |more: &str, seed: &str| {
+            Training::load(&config(more, &[&format!("seed={seed}")]).unwrap(), None).unwrap()
+        };
+        let (plain, random) = (images("", "1"), images(RESPONSE, "1"));
+        assert_eq!(random.images, plain.images);
+        assert_eq!(random.stimuli.len(), 12);
+        let (mut seen, mut changing) = ([0, 0, 0], 0);
+        for (place, first) in plain.stimuli[0].iter() {
+            let changes = plain.stimuli.iter().any(|other| other[place] != *first);
+            changing += usize::from(changes);
+            for pair in random.stimuli.chunks(2) {
+                let (a, b) = (pair[0][place], pair[1][place]);
+                match changes {
+                    true if a == b => seen[2] += 1,
+                    true => {
+                        assert_eq!((a.max(b), a.min(b)), (1.0, 0.0), "{place:?}");
+                        seen[usize::from(a == 1.0)] += 1;
+                    }
+                    false => assert_eq!((a, b), (*first, *first), "{place:?}"),
+                }
+            }
+        }
+        let all = 6.0 * changing as f64;
+        for (seen, expected) in seen.into_iter().zip([0.4, 0.4, 0.2]) {
+            assert!((f64::from(seen) / all - expected).abs() < 0.1, "{seen} of {all}: expected {expected}");
+        }
+        assert!(changing > 20);
+        let opposites = |seed| GaitResponse.prepare(plain.stimuli.clone(), &Physics::default(), seed).0;
+        assert_eq!(opposites(1), random.stimuli);
+        assert_ne!(opposites(2), random.stimuli);
+    }
+
+    #[test]
+    fn every_second_pair_is_shown_from_a_raised_start_without_length_limits() {
+        let [ground, raised] = of_response();
+        let training = Training::load(&config(RESPONSE, &[]).unwrap(), None).unwrap();
+        assert_eq!(
+            training.conditions[..6],
+            [&ground, &ground, &raised, &raised, &ground, &ground].map(Clone::clone)
+        );
+        assert_eq!(training.conditions.len(), 12);
+        let plain = Training::load(&config("", &[]).unwrap(), None).unwrap();
+        assert!(plain.conditions.is_empty());
+    }
+
+    #[test]
+    fn what_does_not_go_with_a_response_is_refused_with_its_key() {
+        assert!(config(RESPONSE, &[]).is_ok());
+        assert!(config(RESPONSE, &["data.images_per_class=4"]).is_ok());
+        assert!(config(RESPONSE, &["genome.voxel_mutations=0.5", "genome.voxel_changes=4"]).is_ok());
+        let refused = [
+            ("data.images_per_class=3", "data.images_per_class = 3", "8 or more"),
+            (
+                "data.train_images=[0, 1, 2, 3, 4, 5, 6, 7, 8]",
+                "data.train_images = 9 images",
+                "an even number",
+            ),
+            ("protocol.rollout=\"sequential\"", "protocol.rollout = \"sequential\"", "\"fresh\""),
+        ];
+        for (set, found, expected) in refused {
+            let message = config(RESPONSE, &[set]).unwrap_err().message;
+            assert!(message.contains(found) && message.contains(expected), "{set}: {message}");
+            assert!(message.contains("evaluation.fitness = \"response\""), "{set}: {message}");
+            assert!(config("", &[set]).is_ok(), "{set}: it is no error by itself");
+        }
+        let splits = CONFIG.replace("groups = [[0], [1]]", "splits = [0, 1, 2]");
+        let message = Config::parse(&format!("{splits}{RESPONSE}"), "a.toml", &[]).unwrap_err().message;
+        assert!(message.contains("a.toml:2: task.splits = 3 tasks: "), "{message}");
+        assert!(message.contains("one task, as groups"), "{message}");
+    }
+}

@@ -6,7 +6,7 @@ pub mod selection;
 use crate::base::error::Error;
 use crate::robots::selection::Selection;
 use crate::store::folder;
-use crate::store::run::StoredRun;
+use crate::store::stored_run::StoredRun;
 use std::path::{Path, PathBuf};
 
 /// Opens a run.json, or the built-in run of the published robots.

@@ -6,7 +6,8 @@ use crate::base::remedy::{Invocation, Remedy};
 use crate::base::text::counted;
 use crate::store::audit::AuditFile;
 use crate::store::folder;
-use crate::store::run::{Robot, StoredRun};
+use crate::store::run::Robot;
+use crate::store::stored_run::StoredRun;
 use crate::store::validation::{Validated, ranking};
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -474,5 +475,12 @@ mod tests {
         }
         let empty = [source(&[])];
         assert!(Selection::All.of(&empty, 1).unwrap_err().message.contains("empty"));
+    }
+
+    #[test]
+    fn an_empty_archive_is_told_with_its_file() {
+        let source = StoredRun { path: "runs/a/run.json".into(), run: samples::run(&[]) };
+        let error = Selection::All.of(&[source], 1).unwrap_err();
+        assert!(error.message.starts_with("runs/a/run.json: "), "{error}");
     }
 }

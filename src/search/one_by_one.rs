@@ -6,8 +6,8 @@ use crate::base::session::Session;
 use crate::robots;
 use crate::robots::selection::{Selection, first_physical};
 use crate::search::validation;
-use crate::store::run::StoredRun;
 use crate::store::run::{Robot, different};
+use crate::store::stored_run::StoredRun;
 use crate::store::validation::Validated;
 use std::path::PathBuf;
 

@@ -15,6 +15,7 @@ pub mod run;
 #[cfg(test)]
 pub(crate) mod samples;
 pub mod setting;
+pub mod stored_run;
 pub mod task;
 pub mod team;
 pub mod training;

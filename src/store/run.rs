@@ -4,7 +4,7 @@ use crate::base::error::Error;
 use crate::base::hash::sha256_hex;
 use crate::base::number;
 use crate::base::ranges;
-use crate::base::remedy::{Invocation, Remedy};
+use crate::base::remedy::Remedy;
 use crate::base::table;
 use crate::body::{Body, VoxelCounts};
 use crate::config::Config;
@@ -12,7 +12,6 @@ use crate::genome::Genome;
 use crate::qd::descriptor::{count_bin, possible_cells};
 use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Elite};
 use crate::shipped::read_text;
-use crate::store::folder;
 use crate::store::images::{DatasetRef, ImageRef, answers};
 use crate::store::results::{self, Stored, by_lines};
 use crate::store::training::Origin;
@@ -23,7 +22,7 @@ use crate::task::score::Answer;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The `format` of `run.json`.
 pub const FORMAT: &str = "morphcog-run";
@@ -409,38 +408,6 @@ pub fn different<'a>(runs: impl IntoIterator<Item = (&'a Path, &'a RunFile)>) ->
     Ok(())
 }
 
-/// A run, and where it lies.
-#[derive(Clone, Debug)]
-pub struct StoredRun {
-    /// Its run.json; what else is known of its robots lies beside it.
-    pub path: PathBuf,
-    /// Its content.
-    pub run: RunFile,
-}
-
-impl StoredRun {
-    /// Reads a run.json.
-    ///
-    /// # Errors
-    /// As [`RunFile::read`].
-    pub fn read(path: &Path) -> Result<Self, Error> {
-        Ok(StoredRun { path: path.to_path_buf(), run: RunFile::read(path)? })
-    }
-
-    /// Checks that its robots have a task.
-    ///
-    /// # Errors
-    /// If they are gaits, which have no task yet; what teaches them one.
-    pub(crate) fn has_task(&self) -> Result<(), Error> {
-        if !self.run.config.measures_response() {
-            return Ok(());
-        }
-        let text = format!("{}: these are gaits, which tell no images apart yet", self.path.display());
-        let train = Invocation::new("train").option("archive", folder::archive(&self.path));
-        Err(Error::input(text).remedy(Remedy::Run(train.option("task", "4|9"), "trains one")))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -463,12 +430,5 @@ mod tests {
         // But it is the same run.
         let twice = [(Path::new("a.json"), &read(&text)), (Path::new("b.json"), &read(&format!("{text}\n")))];
         assert!(different(twice).is_err());
-    }
-
-    #[test]
-    fn an_empty_archive_is_told_with_its_file() {
-        let source = StoredRun { path: "runs/a/run.json".into(), run: samples::run(&[]) };
-        let error = crate::robots::selection::Selection::All.of(&[source], 1).unwrap_err();
-        assert!(error.message.starts_with("runs/a/run.json: "), "{error}");
     }
 }

@@ -11,7 +11,7 @@ use crate::sim::Physics;
 use crate::store::folder;
 use crate::store::images::ImageRef;
 use crate::store::run::RunFile;
-use crate::store::run::StoredRun;
+use crate::store::stored_run::StoredRun;
 use crate::task::evaluation::Savings;
 use crate::task::protocol::Protocol;
 use crate::task::stimulus::StimulusParams;

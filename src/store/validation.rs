@@ -7,7 +7,7 @@ use crate::config::validation::ValidationConfig;
 use crate::shipped::exists;
 use crate::store::names::VALIDATION_JSON;
 use crate::store::results::{self, Stored};
-use crate::store::run::StoredRun;
+use crate::store::stored_run::StoredRun;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;

@@ -16,7 +16,7 @@ use crate::store::folder;
 use crate::store::names::RESPONSE_JSON;
 use crate::store::response::ResponseFile;
 use crate::store::run::Robot;
-use crate::store::run::StoredRun;
+use crate::store::stored_run::StoredRun;
 use crate::store::training::{Batch, Drawn, Elsewhere, Origin};
 use crate::task::protocol::{Protocol, RolloutMode};
 use std::collections::BTreeSet;

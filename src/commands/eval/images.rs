@@ -13,7 +13,7 @@ use crate::images::whereabouts::{see, see_all};
 use crate::store::eval::Baselines;
 use crate::store::images::{HeldOut, ImageRef};
 use crate::store::run::RunFile;
-use crate::store::run::StoredRun;
+use crate::store::stored_run::StoredRun;
 use crate::store::validation::shown as shown_for_validation;
 use crate::task::grouping;
 use std::borrow::Cow;

@@ -1,0 +1,39 @@
+//! [`StoredRun`]: a run and the place of its file.
+
+use crate::base::error::Error;
+use crate::base::remedy::{Invocation, Remedy};
+use crate::store::folder;
+use crate::store::run::RunFile;
+use std::path::{Path, PathBuf};
+
+/// A run, and where it lies.
+#[derive(Clone, Debug)]
+pub struct StoredRun {
+    /// Its run.json; what else is known of its robots lies beside it.
+    pub path: PathBuf,
+    /// Its content.
+    pub run: RunFile,
+}
+
+impl StoredRun {
+    /// Reads a run.json.
+    ///
+    /// # Errors
+    /// As [`RunFile::read`].
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        Ok(StoredRun { path: path.to_path_buf(), run: RunFile::read(path)? })
+    }
+
+    /// Checks that its robots have a task.
+    ///
+    /// # Errors
+    /// If they are gaits, which have no task yet; what teaches them one.
+    pub(crate) fn has_task(&self) -> Result<(), Error> {
+        if !self.run.config.measures_response() {
+            return Ok(());
+        }
+        let text = format!("{}: these are gaits, which tell no images apart yet", self.path.display());
+        let train = Invocation::new("train").option("archive", folder::archive(&self.path));
+        Err(Error::input(text).remedy(Remedy::Run(train.option("task", "4|9"), "trains one")))
+    }
+}
