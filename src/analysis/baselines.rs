@@ -2,7 +2,8 @@
 
 use crate::base::Grid;
 use crate::baseline::nearest::nearest;
-use crate::task::grouping::{Group, Split};
+use crate::task::fitness::Group;
+use crate::task::grouping::Split;
 
 /// An image as the sensors see it, with its class.
 #[derive(Clone, Copy, Debug)]

@@ -3,11 +3,12 @@
 use crate::base::number;
 use crate::config::audit::Criteria;
 use crate::store::audit::{PerturbedRollout, Verdict};
+use crate::task::answer::Answer;
 use crate::task::answer::{Assignment, Direction};
 use crate::task::fitness::Fitness;
-use crate::task::grouping::{Group, Split};
+use crate::task::fitness::Group;
+use crate::task::grouping::Split;
 use crate::task::perturbation::Kind;
-use crate::task::score::Answer;
 
 /// Balanced accuracy of a robot that always walks the same way.
 const CHANCE: f64 = 0.5;

@@ -5,7 +5,7 @@ use crate::search::held_out_run::Trial;
 use crate::store::images::ImageRef;
 use crate::store::team::{Accuracy, Answers, Decoded, Member, TeamFile};
 use crate::task::answer::{Assignment, Direction, Readout, is_correct};
-use crate::task::grouping::Group;
+use crate::task::fitness::Group;
 use serde::Serialize;
 
 /// Largest displacement that counts in a sum of walks \[voxel lengths\].

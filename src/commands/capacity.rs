@@ -24,7 +24,8 @@ use crate::store::run::RunFile;
 use crate::store::setting::{RunRef, Setting};
 use crate::store::trainings::Trainings;
 use crate::store::unwritten::Unwritten;
-use crate::task::grouping::{self, Group};
+use crate::task::fitness::Group;
+use crate::task::grouping::{self};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -70,7 +71,7 @@ pub fn capacity(options: &Options, session: &Session) -> Result<Finished, Error>
     }
     replaced::<CapacityFile>(&options.out)?;
     let robots = robots(&report, options)?;
-    let images = Images::of(&report, setting, options, session)?;
+    let images = Images::of(&report, setting, (&options.eval, config), session)?;
     let grouping = setting.task.grouping()?;
     let of_split = |split: &grouping::Split| -> Vec<&RobotReport> {
         robots.iter().copied().filter(|robot| split.is_called(&robot.task)).collect()

@@ -8,7 +8,7 @@ use crate::base::ranges::MOST;
 use crate::base::remedy::Remedy;
 use crate::base::session::Session;
 use crate::base::text::counted;
-use crate::commands::eval::images::HeldOutImages;
+use crate::commands::eval::images::{Draw, HeldOutImages};
 use crate::config::validation::LEAST;
 use crate::config::{Config, TaskConfig};
 use crate::data::dataset::{Dataset, Split};
@@ -58,6 +58,13 @@ pub struct Options {
     pub out: PathBuf,
 }
 
+impl Options {
+    fn draw(&self) -> Draw {
+        let choosing = self.robots.validated().map(|_| self.validation);
+        Draw { images: self.images, split: self.split, seed: self.seed, choosing }
+    }
+}
+
 /// Result of an evaluation.
 #[derive(Clone, Debug)]
 pub struct Finished {
@@ -82,7 +89,7 @@ pub fn eval(options: &Options, session: &Session) -> Result<Finished, Error> {
     let part = |source: &StoredRun| part_of_others(&source.run.config, size, dataset, options.split.split());
     sources.iter().find_map(part).iter().for_each(|text| session.observer.warning(text));
     let robots = skilled(options.robots.of(sources, options.seed)?, grouping, session)?;
-    let shown = HeldOutImages::draw(config, sources, dataset, options)?;
+    let shown = HeldOutImages::draw(config, sources, dataset, options.draw())?;
     let mut report = opened.report(options, &shown);
     let tasks = robots
         .iter()
@@ -123,7 +130,7 @@ pub fn eval(options: &Options, session: &Session) -> Result<Finished, Error> {
 pub(crate) fn known(options: &Options, session: &Session) -> Result<Option<EvalFile>, Error> {
     let Ok(known) = EvalFile::read(&options.out) else { return Ok(None) };
     let opened = Opened::new(options, session)?;
-    let shown = HeldOutImages::draw(&opened.config, &opened.sources, &opened.dataset, options)?;
+    let shown = HeldOutImages::draw(&opened.config, &opened.sources, &opened.dataset, options.draw())?;
     let is_it = !known.stopped
         && known.head() == opened.report(options, &shown)
         && is_of_robots(&known, &opened.sources, options)?;

@@ -7,8 +7,8 @@ use crate::config::Config;
 use crate::data::dataset::{Dataset, DatasetError, Split};
 use crate::images::whereabouts::{load_dataset, see};
 use crate::store::images::{DatasetRef, ImageRef, answers};
+use crate::task::answer::Answer;
 use crate::task::perturbation::Condition;
-use crate::task::score::Answer;
 use std::path::Path;
 
 /// The training images of a run and their stimuli.

@@ -5,13 +5,13 @@ use crate::base::random::{Purpose, stream};
 use crate::body::Body;
 use crate::response::gait::random_image;
 use crate::sim::Physics;
+use crate::task::answer::Answer;
 use crate::task::evaluation::MayWin;
 use crate::task::fitness::LEAST_IMAGES;
 use crate::task::fitness::response_so_far;
 use crate::task::grouping::Grouping;
 use crate::task::objective::Objective;
 use crate::task::perturbation::{Condition, of_response};
-use crate::task::score::Answer;
 use std::borrow::Cow;
 
 /// Index of evolution's random images, unlike that of a training's, which is 0.

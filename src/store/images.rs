@@ -1,7 +1,7 @@
 //! References to the images of runs and evaluations: places in a dataset, and held-out choices.
 
 use crate::data::dataset::Split;
-use crate::task::score::Answer;
+use crate::task::answer::Answer;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::borrow::Cow;

@@ -5,7 +5,6 @@ use crate::base::hash::sha256_hex;
 use crate::base::number::is_zero;
 use crate::base::ranges;
 use crate::store::results::Stored;
-use crate::store::run::RunFile;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -54,24 +53,6 @@ pub struct Drawn {
     pub images_per_class: usize,
     /// The seed.
     pub seed: u64,
-}
-
-impl Elsewhere {
-    /// Returns the training images of a run.
-    pub(crate) fn of(run: &RunFile) -> Self {
-        let config = &run.config;
-        let before = run.origin.iter().flat_map(|origin| origin.trained_on.iter().copied());
-        let drawn = || Drawn {
-            classes: config.classes(),
-            images_per_class: config.data.images_per_class,
-            seed: config.seed,
-        };
-        Elsewhere {
-            train_sha256: run.dataset.train_sha256.clone(),
-            indices: run.training_images.iter().map(|image| image.index).chain(before).collect(),
-            drawn: config.data.train_images.is_none().then(drawn),
-        }
-    }
 }
 
 /// Displacements that were simulated together, in the order of the images; `None` if unstable.

@@ -2,12 +2,28 @@
 //! and the classes that a walk names ([`Readout`]) (paper, section "Generalization test").
 
 use crate::task::fitness::Fitness;
-use crate::task::grouping::{Group, Split};
-use crate::task::score::{Answer, of_split};
+use crate::task::fitness::Group;
+use crate::task::grouping::Split;
 use serde::Serialize;
 
 /// Displacements up to this many voxel lengths are no answer (paper, "Generalization test").
 pub const THRESHOLD: f64 = 3.0;
+
+/// A robot's answer to an image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Answer {
+    /// Class of the image.
+    pub class: u8,
+    /// Displacement to the right under it, in voxel lengths; `None` if not simulated yet.
+    pub displacement: Option<f64>,
+}
+
+pub(super) fn of_split(
+    split: &Split,
+    answers: &[Answer],
+) -> impl Iterator<Item = (Group, Option<f64>)> + Clone {
+    answers.iter().filter_map(|answer| Some((split.group(answer.class)?, answer.displacement)))
+}
 
 /// A way to walk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

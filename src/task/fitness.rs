@@ -1,9 +1,17 @@
 //! [`Fitness`]: combines a robot's answers to several images into one number.
 
-use crate::task::grouping::Group;
 use crate::task::perturbation::CONDITIONS_OF_RESPONSE;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+/// One of the two groups of a [`Split`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Group {
+    /// The first, named before the bar.
+    A,
+    /// The second.
+    B,
+}
 
 /// Fewest images under which a response is measured: two pairs in each condition.
 pub(crate) const LEAST_IMAGES: usize = 8;

@@ -7,18 +7,9 @@
 //! against 26, and `1|26` is 1 against 2 and 6. So a name means one task, whatever the data, and a
 //! task has one name.
 
-use crate::task::fitness::Fitness;
+use crate::task::fitness::{Fitness, Group};
 use std::fmt;
 use std::str::FromStr;
-
-/// One of the two groups of a [`Split`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Group {
-    /// The first, named before the bar.
-    A,
-    /// The second.
-    B,
-}
 
 /// Classes in two groups; "all the same way" is the split with an empty second group.
 #[derive(Clone, Debug, PartialEq, Eq)]

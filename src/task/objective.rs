@@ -3,10 +3,10 @@
 use crate::base::Grid;
 use crate::body::{Body, key};
 use crate::sim::Physics;
+use crate::task::answer::Answer;
 use crate::task::evaluation::MayWin;
 use crate::task::grouping::Grouping;
 use crate::task::perturbation::Condition;
-use crate::task::score::Answer;
 use std::borrow::Cow;
 
 /// The objective of evolution: which body is simulated for a candidate, under which images, and what

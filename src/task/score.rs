@@ -6,18 +6,10 @@
 //! things follow that make savings lossless: fitness is continuous (d = 0 counts as wrong, with
 //! margin 0), and the fitness on some of the images is an upper bound of that on all.
 
-use crate::task::answer::Assignment;
+use crate::task::answer::{Answer, Assignment, of_split};
+use crate::task::fitness::Group;
 use crate::task::fitness::{Fitness, better};
-use crate::task::grouping::{Group, Grouping, Split};
-
-/// A robot's answer to an image.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Answer {
-    /// Class of the image.
-    pub class: u8,
-    /// Displacement to the right under it, in voxel lengths; `None` if not simulated yet.
-    pub displacement: Option<f64>,
-}
+use crate::task::grouping::{Grouping, Split};
 
 /// The task that a robot performs, and its fitness there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,13 +24,6 @@ pub struct Score {
 /// both assignments of directions. Infinite without answers, NaN with a NaN answer; never −0.
 pub fn two_group_fitness(answers: &[(Group, f64)]) -> f64 {
     better(Fitness::Min.of_assignments(answers.iter().map(|&(group, d)| (group, Some(d)))))
-}
-
-pub(super) fn of_split(
-    split: &Split,
-    answers: &[Answer],
-) -> impl Iterator<Item = (Group, Option<f64>)> + Clone {
-    answers.iter().filter_map(|answer| Some((split.group(answer.class)?, answer.displacement)))
 }
 
 impl Grouping {

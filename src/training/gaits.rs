@@ -15,7 +15,7 @@ use crate::robots::selection::Selection;
 use crate::store::folder;
 use crate::store::names::RESPONSE_JSON;
 use crate::store::response::ResponseFile;
-use crate::store::run::Robot;
+use crate::store::run::{Robot, RunFile};
 use crate::store::stored_run::StoredRun;
 use crate::store::training::{Batch, Drawn, Elsewhere, Origin};
 use crate::task::protocol::{Protocol, RolloutMode};
@@ -121,4 +121,22 @@ pub(crate) fn key(config: &Config, seed_of_gaits: u64, walkers: &[Walker], train
         training.dataset.train_sha256
     );
     sha256_hex(text.as_bytes())
+}
+
+impl Elsewhere {
+    /// Returns the training images of a run.
+    fn of(run: &RunFile) -> Self {
+        let config = &run.config;
+        let before = run.origin.iter().flat_map(|origin| origin.trained_on.iter().copied());
+        let drawn = || Drawn {
+            classes: config.classes(),
+            images_per_class: config.data.images_per_class,
+            seed: config.seed,
+        };
+        Elsewhere {
+            train_sha256: run.dataset.train_sha256.clone(),
+            indices: run.training_images.iter().map(|image| image.index).chain(before).collect(),
+            drawn: config.data.train_images.is_none().then(drawn),
+        }
+    }
 }

@@ -7,6 +7,7 @@ mod config;
 pub(crate) mod gaits;
 pub(crate) mod log;
 pub mod race;
+pub(crate) mod rollouts;
 pub mod rounds;
 pub(crate) mod trainer;
 pub(crate) mod window;

@@ -17,7 +17,7 @@ use crate::response::lesson::{Example, Lesson};
 use crate::response::regression::{Evidence, Moments};
 use crate::sim::{Physics, width};
 use crate::task::fitness::clipped_margin;
-use crate::training::rounds::{Image, Rollouts};
+use crate::training::rollouts::{Image, Rollouts};
 
 /// Images in a challenger's first look; each next look takes twice as many. With fewer, good
 /// challengers are dropped by chance; with more, bad ones cost more.

@@ -10,11 +10,12 @@ use crate::base::Grid;
 use crate::base::random::{Purpose, Stream, stream};
 use crate::body::{Body, Material};
 use crate::response::gait::{Design, Gait, SENSORS};
-use crate::response::lesson::{Example, Lesson};
+use crate::response::lesson::Lesson;
 use crate::response::regression::{Evidence, Moments, Response, dot};
 use crate::sim::Physics;
 use crate::task::fitness::clipped_margin;
 use crate::training::race::{Challenge, Refinement, WeightedImage};
+use crate::training::rollouts::{Image, Rollouts};
 use std::collections::BTreeSet;
 
 /// Weight of rollouts with random images, relative to those around the latest design. They are
@@ -51,19 +52,6 @@ pub struct Plan {
     pub challengers: usize,
     /// Least number of muscles in such a body.
     pub min_muscles: usize,
-}
-
-/// A training image as a gait sees it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Image {
-    /// Pixels at the voxels.
-    pub stimulus: Grid<f64>,
-    /// Its class.
-    pub class: u8,
-    /// Its widths, its correct side and its weight.
-    pub example: Example,
-    /// Number of its condition, from 0.
-    pub condition: usize,
 }
 
 /// The results of a round.
@@ -108,23 +96,6 @@ pub struct Taught {
     pub side: f64,
     /// Rollouts, without the first response.
     pub rollouts: usize,
-}
-
-/// A simulator of designs.
-pub trait Rollouts {
-    /// Error of a simulation: it was stopped, or a file could not be written.
-    type Error;
-    /// Returns the displacements of a body under stimuli and conditions \[voxel lengths\]; `None`
-    /// where it is unstable.
-    ///
-    /// # Errors
-    /// Returns an error if it was stopped, or if a file cannot be written.
-    fn roll(
-        &mut self,
-        body: &Body,
-        stimuli: &[Grid<f64>],
-        conditions: &[usize],
-    ) -> Result<Vec<Option<f64>>, Self::Error>;
 }
 
 /// Trains a gait with a known response to tell images apart.
@@ -464,6 +435,7 @@ mod tests {
     use super::*;
     use crate::body::Body;
     use crate::response::gait::{CHOICES, random_image};
+    use crate::response::lesson::Example;
     use crate::response::regression::Shown;
     use std::convert::Infallible;
 

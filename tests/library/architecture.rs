@@ -360,11 +360,9 @@ fn cycles(src: &Path) -> Vec<Vec<String>> {
 }
 
 #[test]
-fn no_import_cycle_has_more_than_two_files() {
-    for src in [root().join("src"), root().join("crates/sim/src")] {
-        let long: Vec<_> = cycles(&src).into_iter().filter(|cycle| cycle.len() > 2).collect();
-        assert!(long.is_empty(), "{}: {long:#?}", src.display());
-    }
+fn import_cycles_are_few_and_of_two_files() {
+    let all = [root().join("src"), root().join("crates/sim/src")].map(|src| cycles(&src)).concat();
+    assert!(all.len() <= 3 && all.iter().all(|cycle| cycle.len() == 2), "{all:#?}");
 }
 
 #[test]

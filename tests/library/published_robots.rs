@@ -11,7 +11,7 @@ use morphcog::data::files::places;
 use morphcog::robots::published;
 use morphcog::sim::{Physics, System};
 use morphcog::store::eval::EvalFile;
-use morphcog::task::grouping::Group::{A, B};
+use morphcog::task::fitness::Group::{A, B};
 use morphcog::task::protocol::{Protocol, RolloutMode};
 use morphcog::task::rollout::{Rollout, fresh_rollout};
 use morphcog::task::score::two_group_fitness;

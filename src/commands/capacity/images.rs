@@ -7,7 +7,6 @@ use crate::base::random::{Purpose, stream};
 use crate::base::remedy::Remedy;
 use crate::base::session::Session;
 use crate::baseline::{Kind, Samples, Trained, train};
-use crate::commands::capacity::Options;
 use crate::config::capacity::CapacityConfig;
 use crate::data::dataset::{Dataset, Split};
 use crate::images::whereabouts::{Whereabouts, seen};
@@ -15,8 +14,8 @@ use crate::store::eval::EvalFile;
 use crate::store::images::ImageRef;
 use crate::store::names::RUN_JSON;
 use crate::store::setting::{RunRef, Setting};
+use crate::task::fitness::Group;
 use crate::task::grouping;
-use crate::task::grouping::Group;
 use std::path::{Path, PathBuf};
 
 /// The images that networks train on, wait on and are tested on, with their classes.
@@ -39,16 +38,16 @@ impl Images {
     pub fn of(
         report: &EvalFile,
         setting: &Setting,
-        options: &Options,
+        (eval, config): (&Path, &CapacityConfig),
         session: &Session,
     ) -> Result<Images, Error> {
         let dataset =
-            whereabouts(options, session).load_of(&setting.train_sha256, &setting.data, &Split::ALL)?;
+            whereabouts(eval, session).load_of(&setting.train_sha256, &setting.data, &Split::ALL)?;
         if report.test_sha256 != dataset.fingerprint(Split::Test) {
             let text = format!(
                 "{}: the images here are not those of {} (another SHA-256)",
                 dataset.place(),
-                options.eval.display()
+                eval.display()
             );
             return Err(Error::input(text).remedy(Remedy::NameData));
         }
@@ -59,11 +58,8 @@ impl Images {
             };
             images.iter().map(one).collect()
         };
-        let waited = if options.config.clean {
-            waiting(&dataset, setting, &report.runs, options)?
-        } else {
-            Vec::new()
-        };
+        let waited =
+            if config.clean { waiting(&dataset, setting, &report.runs, config)? } else { Vec::new() };
         let training: Result<Vec<_>, Error> =
             report.runs.iter().map(|run| see(Split::Train, &run.training_images)).collect();
         let (training, test_images) = (training?, see(Split::Test, &report.images)?);
@@ -79,12 +75,12 @@ impl Images {
 }
 
 /// Collects the whereabouts of the images from runs beside the evaluation or in folders there.
-fn whereabouts(options: &Options, session: &Session) -> Whereabouts {
-    let folder = options.eval.parent().filter(|folder| !folder.as_os_str().is_empty());
+fn whereabouts(eval: &Path, session: &Session) -> Whereabouts {
+    let folder = eval.parent().filter(|folder| !folder.as_os_str().is_empty());
     let entries = std::fs::read_dir(folder.unwrap_or(Path::new("."))).into_iter().flatten().flatten();
     let mut runs: Vec<PathBuf> = entries.map(|entry| entry.path().join(RUN_JSON)).collect();
     runs.sort();
-    let here = Whereabouts::given(session.folder()).and_of(&options.eval);
+    let here = Whereabouts::given(session.folder()).and_of(eval);
     runs.iter().fold(here, |whereabouts, run| whereabouts.and_of(run))
 }
 
@@ -93,10 +89,10 @@ fn waiting(
     dataset: &Dataset,
     setting: &Setting,
     runs: &[RunRef],
-    options: &Options,
+    config: &CapacityConfig,
 ) -> Result<Vec<ImageRef>, Error> {
     let classes = setting.task.classes();
-    let per_class = options.config.waiting_images.div_ceil(classes.len().max(1));
+    let per_class = config.waiting_images.div_ceil(classes.len().max(1));
     let trained =
         |index: &usize| runs.iter().any(|run| run.training_images.iter().any(|i| i.index == *index));
     let mut all = Vec::new();
@@ -113,7 +109,7 @@ fn waiting(
             };
             return Err(Error::input(text).advice(advice));
         }
-        let rng = &mut stream(options.config.seed, Purpose::Waiting, 0, u64::from(label));
+        let rng = &mut stream(config.seed, Purpose::Waiting, 0, u64::from(label));
         all.extend(rng.sample(free.len(), per_class).into_iter().map(|i| ImageRef { index: free[i], label }));
     }
     Ok(all)

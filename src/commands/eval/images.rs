@@ -3,7 +3,6 @@
 use crate::analysis::baselines::{Labelled, best_pixel, larger_group, nearest_training_image};
 use crate::base::Grid;
 use crate::base::error::Error;
-use crate::commands::eval::Options;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
 use crate::images::held_out;
@@ -11,7 +10,7 @@ use crate::images::held_out::images_besides;
 use crate::images::training::Training;
 use crate::images::whereabouts::{see, see_all};
 use crate::store::eval::Baselines;
-use crate::store::images::{HeldOut, ImageRef};
+use crate::store::images::{HeldOut, HowMany, ImageRef};
 use crate::store::run::RunFile;
 use crate::store::stored_run::StoredRun;
 use crate::store::validation::shown as shown_for_validation;
@@ -22,11 +21,25 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Training images per class on which the single-pixel baseline is chosen.
 const PIXEL_IMAGES_PER_CLASS: usize = 500;
 
+/// Held-out images to draw.
+#[derive(Clone, Copy)]
+pub(crate) struct Draw {
+    /// The number of images in all.
+    pub images: HowMany,
+    /// Test or validation images.
+    pub split: HeldOut,
+    /// Seed of the draw.
+    pub seed: u64,
+    /// Images by which robots are chosen at the same time, if they are; `None` in it: as many as
+    /// the config says.
+    pub choosing: Option<Option<usize>>,
+}
+
 /// Test or validation images, as robots see them.
 pub(crate) struct HeldOutImages<'a> {
     config: &'a Config,
     dataset: &'a Dataset,
-    options: &'a Options,
+    draw: Draw,
     /// The images.
     pub images: Vec<ImageRef>,
     /// Each image as all robots see it together.
@@ -43,28 +56,28 @@ impl<'a> HeldOutImages<'a> {
         config: &'a Config,
         sources: &[StoredRun],
         dataset: &'a Dataset,
-        options: &'a Options,
+        draw: Draw,
     ) -> Result<Self, Error> {
-        let (asked, least) = (options.images, config.classes().len());
+        let (asked, least) = (draw.images, config.classes().len());
         if !asked.has_each(least) {
             let text = format!("expected {least} or more, one of each class");
             return Err(Error::argument("images", asked, text));
         }
         let classes = config.classes();
-        let images = match options.split {
-            HeldOut::Test => held_out::test_images(&classes, dataset, asked, options.seed)?,
+        let images = match draw.split {
+            HeldOut::Test => held_out::test_images(&classes, dataset, asked, draw.seed)?,
             HeldOut::Validation => {
                 let runs: Vec<_> = sources.iter().map(|source| &source.run).collect();
                 // Images that choose robots now, or did before, as `validation.json` says.
-                let count = |source: &StoredRun| match options.robots.validated() {
-                    Some(_) => Ok(Some(options.validation.unwrap_or(config.validation.images))),
+                let count = |source: &StoredRun| match draw.choosing {
+                    Some(images) => Ok(Some(images.unwrap_or(config.validation.images))),
                     None => shown_for_validation(source),
                 };
                 let besides = chosen_by(sources, dataset, count)?;
                 images_besides(&besides, &runs, &classes, dataset, Some("images"), asked)?
             }
         };
-        let split = options.split.split();
+        let split = draw.split.split();
         let stimuli = see_all(config, dataset, split, &images)?;
         // Every rank refuses images that a run's robots cannot see, before the first rollout.
         if let Some(first) = images.first() {
@@ -72,7 +85,7 @@ impl<'a> HeldOutImages<'a> {
                 see(&source.run.config, dataset, split, first.index)?;
             }
         }
-        Ok(HeldOutImages { config, dataset, options, images, stimuli })
+        Ok(HeldOutImages { config, dataset, draw, images, stimuli })
     }
 
     /// Returns the images as robots of a run see them, in order.
@@ -82,7 +95,7 @@ impl<'a> HeldOutImages<'a> {
     pub fn seen_by(&self, config: &Config) -> Result<Cow<'_, [Grid<f64>]>, Error> {
         match config.stimulus == self.config.stimulus {
             true => Ok(Cow::Borrowed(&self.stimuli)),
-            false => see_all(config, self.dataset, self.options.split.split(), &self.images).map(Cow::Owned),
+            false => see_all(config, self.dataset, self.draw.split.split(), &self.images).map(Cow::Owned),
         }
     }
 
@@ -138,14 +151,14 @@ impl<'a> HeldOutImages<'a> {
 
     /// Draws training images to choose a single pixel by, without the evaluated ones.
     fn pixel_images(&self) -> Result<Vec<ImageRef>, Error> {
-        let shown: BTreeSet<usize> = match self.options.split {
+        let shown: BTreeSet<usize> = match self.draw.split {
             HeldOut::Test => BTreeSet::new(),
             HeldOut::Validation => self.images.iter().map(|image| image.index).collect(),
         };
         let mut choice = Vec::new();
         for label in self.config.classes() {
             let count = self.dataset.indices_of(Split::Train, label).len().min(PIXEL_IMAGES_PER_CLASS);
-            let drawn = self.dataset.draw(Split::Train, &[label], count, self.options.seed);
+            let drawn = self.dataset.draw(Split::Train, &[label], count, self.draw.seed);
             let drawn = drawn.map_err(|error| Error::input(error.to_string()))?;
             let others = drawn.into_iter().filter(|index| !shown.contains(index));
             choice.extend(others.map(|index| ImageRef { index, label }));

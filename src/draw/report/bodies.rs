@@ -9,10 +9,13 @@ use crate::draw::html::escape;
 use crate::draw::plot::canvas::Piece;
 use crate::draw::plot::robot;
 use crate::draw::report::Spell;
-use crate::draw::report::maps::Rollouts;
 use crate::store::run::Robot;
+use std::collections::BTreeMap;
 use std::collections::BTreeSet;
 use std::fmt::Write;
+
+/// Packed rollouts by run and robot.
+pub(super) struct Rollouts(pub(super) BTreeMap<(usize, String), String>);
 
 /// Robots of each kind in the page.
 const SHOWN: usize = 5;

@@ -6,7 +6,7 @@ use crate::draw::error::PictureError;
 use crate::draw::html::{escape, packed};
 use crate::draw::plot::{below, sequential};
 use crate::draw::report::Spell;
-use crate::draw::report::bodies::{bodies, button};
+use crate::draw::report::bodies::{Rollouts, bodies, button};
 use crate::draw::walk::Walk;
 use crate::qd::descriptor::{COUNT_BINS, DescriptorSpace, possible_cells};
 use crate::store::run::Robot;
@@ -21,9 +21,6 @@ const MOST_OF_ONE: usize = 1_500_000;
 /// The element in which the chosen robot walks.
 const PLAYER: &str = "<div>\n<p class=\"about\" aria-live=\"polite\"></p>\n<iframe title=\"The chosen \
      robot\"></iframe>\n</div>\n";
-
-/// Packed rollouts by run and robot.
-pub(super) struct Rollouts(BTreeMap<(usize, String), String>);
 
 /// Returns the robots of a run that can be played: the fittest.
 pub(super) fn played(dossier: &Dossier, most: usize) -> Vec<&Robot> {

@@ -14,7 +14,7 @@ use crate::draw::error::PictureError;
 use crate::draw::html::{escape, fill};
 use crate::draw::plot::Figure;
 use crate::draw::{html, plot};
-use maps::Rollouts;
+use bodies::Rollouts;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 const SCRIPT: &str =
