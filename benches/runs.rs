@@ -9,7 +9,7 @@ use morphcog::base::session::Session;
 use morphcog::base::stop::NEVER;
 use morphcog::body::Body;
 use morphcog::commands::bench;
-use morphcog::commands::evolve::{Options, evolve};
+use morphcog::commands::evolve::{EvolveOptions, evolve};
 use morphcog::config::Config;
 use morphcog::genome::Genome;
 use morphcog::sim::{InstructionSet, System, Worlds};
@@ -118,7 +118,7 @@ fn evaluations(criterion: &mut Criterion) {
 
 fn bookkeeping(criterion: &mut Criterion) {
     let folder = tempfile::tempdir().expect("there is a temporary folder");
-    let options = Options {
+    let options = EvolveOptions {
         config: config(&OVERRIDES),
         name: "bench".to_string(),
         out: folder.path().join("run"),

@@ -9,10 +9,10 @@ use morphcog::base::random::{Purpose, stream};
 use morphcog::base::ranks::{Ranks, owners};
 use morphcog::base::session::Session;
 use morphcog::body::Body;
-use morphcog::commands::evolve::{Options, evolve};
+use morphcog::commands::evolve::{EvolveOptions, evolve};
 use morphcog::config::Config;
 use morphcog::data::dataset::Split;
-use morphcog::images::training::Training;
+use morphcog::images::training::TrainingImages;
 use morphcog::images::whereabouts::Whereabouts;
 use morphcog::store::folder::IfExists;
 use morphcog::store::run::RunFile;
@@ -92,7 +92,7 @@ fn measure(overrides: &[&str], before: u64, measured: u64) -> Vec<Vec<Piece>> {
     let config = Config::load("zero_one_published.toml", &all).expect("the config is valid");
     let folder = tempfile::tempdir().expect("there is a temporary folder");
     let run = |generations: u64| -> RunFile {
-        let options = Options {
+        let options = EvolveOptions {
             config: Config { generations, ..config.clone() },
             name: "scaling".to_string(),
             out: folder.path().join("run"),
@@ -101,7 +101,7 @@ fn measure(overrides: &[&str], before: u64, measured: u64) -> Vec<Vec<Piece>> {
         evolve(&options, &Session::default()).expect("the run ends").run
     };
     let dataset = Whereabouts::given(None).load(&config.data, &[Split::Train]).expect("digits are drawn");
-    let training = Training::of(&config, &dataset).expect("there are images");
+    let training = TrainingImages::of(&config, &dataset).expect("there are images");
     let grouping = config.grouping().expect("the config has a task").with_fitness(config.evaluation.fitness);
     (0..measured)
         .map(|generation| {

@@ -30,7 +30,7 @@ use crate::cli::output::pictures::Format;
 use crate::cli::output::reporters::Reporter;
 use crate::cli::output::{pictures, summary};
 use crate::commands::evolve;
-use crate::commands::plan::{PAPER_TOML, Plan};
+use crate::commands::plan::{PAPER_TOML, PaperPlan};
 use crate::commands::schema::{self, Schema};
 use crate::commands::{bench, data, eval, replay, simulate};
 use crate::config;
@@ -98,8 +98,8 @@ pub fn run(cli: Cli, console: &Console, ranks: Ranks) -> Result<(), Error> {
             summary::configs(console, &[&config::BUILT_IN[..], &[PAPER_TOML]].concat());
             Ok(())
         }
-        Command::Config { name: Some(name), set } if Plan::is_built_in(&name) => {
-            console.text(&Plan::load(&name, &set)?.to_toml());
+        Command::Config { name: Some(name), set } if PaperPlan::is_built_in(&name) => {
+            console.text(&PaperPlan::load(&name, &set)?.to_toml());
             Ok(())
         }
         Command::Config { name: Some(name), set } => {
@@ -182,7 +182,7 @@ fn run_evolve(args: EvolveArgs, console: &Console, ranks: Ranks) -> Result<(), E
         _ => IfExists::Refuse,
     };
     let with = || Resources { ranks, ..Resources::of(args.threads, args.data.clone()) };
-    let options = evolve::Options { config, name, out: out.clone(), if_exists };
+    let options = evolve::EvolveOptions { config, name, out: out.clone(), if_exists };
     let training = match args.train {
         true => Some(in_session(console, with(), |session| train::after_evolution(&options, session))?),
         false => None,
@@ -211,17 +211,17 @@ fn run_evolve(args: EvolveArgs, console: &Console, ranks: Ranks) -> Result<(), E
     }
     let out = training.map_or(out, |training| training.out);
     if args.replay && ranks.leads() {
-        let shown = replay::Options { data: args.data, ..replay::Options::default() };
+        let shown = replay::ReplayOptions { data: args.data, ..replay::ReplayOptions::default() };
         replay_best(&out, shown, console)?;
     }
     Ok(())
 }
 
 /// Replays the best robot of a run into its folder.
-fn replay_best(folder: &Path, shown: replay::Options, console: &Console) -> Result<(), Error> {
+fn replay_best(folder: &Path, shown: replay::ReplayOptions, console: &Console) -> Result<(), Error> {
     let (robot, archive) = (BEST.to_string(), Some(folder.join(RUN_JSON)));
-    let replay = replay::replay(&replay::Options { robot, archive, ..shown })?;
-    let wanted = pictures::Wanted::beside(folder, &replay.name, &[Format::Gif, Format::Html]);
+    let replay = replay::replay(&replay::ReplayOptions { robot, archive, ..shown })?;
+    let wanted = pictures::PicturesWanted::beside(folder, &replay.name, &[Format::Gif, Format::Html]);
     pictures::make(console, &replay, &wanted).map(drop)
 }
 
@@ -231,7 +231,7 @@ fn run_eval(args: EvalArgs, console: &Console, ranks: Ranks) -> Result<(), Error
     choice::say_simulated(&archives, console);
     let beside = || folder::beside_all(&archives, eval::own_name(args.split));
     let out = args.out.unwrap_or_else(beside);
-    let options = eval::Options {
+    let options = eval::EvalOptions {
         robots: robots.physical(args.physical_only),
         images: args.images,
         split: args.split,
@@ -247,8 +247,8 @@ fn run_eval(args: EvalArgs, console: &Console, ranks: Ranks) -> Result<(), Error
 }
 
 /// Tests robots, and prints the results.
-fn test(options: &eval::Options, with: Resources, console: &Console) -> Result<(), Error> {
-    let eval::Finished { file: report, unwritten } =
+fn test(options: &eval::EvalOptions, with: Resources, console: &Console) -> Result<(), Error> {
+    let eval::EvalOutcome { file: report, unwritten } =
         in_session(console, with, |session| eval::eval(options, session))?;
     let capacity = CapacityFile::of(&report, &options.out);
     let written = unwritten.is_none().then_some(options.out.as_path());
@@ -272,7 +272,7 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
     let ReplayArgs { physical_only, images, dataset, data, format, out, open, .. } = args;
     let (width, every, fps, look) = (args.width, usize::from(args.every), args.fps, args.look);
     // A wrong file name must be reported before the simulation starts.
-    let named = out.as_deref().map(|path| pictures::Wanted::named(path, &format)).transpose()?;
+    let named = out.as_deref().map(|path| pictures::PicturesWanted::named(path, &format)).transpose()?;
     // Without a run, it shows the best body that ships with the program.
     let is_bare = args.archive.is_none() && args.robot == Selection::Ids(vec![BEST.to_string()]);
     let is_first_look = is_bare && folder::newest_run().is_err();
@@ -280,10 +280,11 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
         true => vec![folder::first_run(PathBuf::from(gallery::ZERO_ONE)).map_err(Error::other)?],
         false => args.archive.map_or(Vec::new(), |Runs(paths)| paths),
     };
-    let search = one_by_one::Options { robots: args.robot, archives, physical_only, seed: args.seed };
+    let search = one_by_one::RobotChoice { robots: args.robot, archives, physical_only, seed: args.seed };
     let Named { archive, robot } = the_one(&search, data.clone(), console)?;
     let folder = pictures::folder(&archive);
-    let options = replay::Options { robot, physical_only, archive: Some(archive), images, data, dataset };
+    let options =
+        replay::ReplayOptions { robot, physical_only, archive: Some(archive), images, data, dataset };
     if is_first_look {
         console.info(&format!("no run under runs/: the best body of {}", gallery::ZERO_ONE));
     }
@@ -291,12 +292,13 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
     let replay = match replay::replay(&options) {
         Err(error) if is_first_look && is_any && error.kind == ErrorKind::Input => {
             console.info(&format!("{}; it sees the program's own digits instead", error.message));
-            replay::replay(&replay::Options { dataset: Some(BUILTIN.to_string()), ..options })
+            replay::replay(&replay::ReplayOptions { dataset: Some(BUILTIN.to_string()), ..options })
         }
         replay => replay,
     }?;
-    let wanted = named.unwrap_or_else(|| pictures::Wanted::beside(&folder, &replay.name, &format));
-    let made = pictures::make(console, &replay, &pictures::Wanted { width, every, fps, look, ..wanted })?;
+    let wanted = named.unwrap_or_else(|| pictures::PicturesWanted::beside(&folder, &replay.name, &format));
+    let made =
+        pictures::make(console, &replay, &pictures::PicturesWanted { width, every, fps, look, ..wanted })?;
     match made.last().filter(|_| open) {
         Some(path) => show(path),
         None => Ok(()),
@@ -312,7 +314,11 @@ fn show(path: &Path) -> Result<(), Error> {
 }
 
 /// Returns the robot to watch.
-fn the_one(search: &one_by_one::Options, data: Option<PathBuf>, console: &Console) -> Result<Named, Error> {
+fn the_one(
+    search: &one_by_one::RobotChoice,
+    data: Option<PathBuf>,
+    console: &Console,
+) -> Result<Named, Error> {
     // If it is certain that there are several, no search is needed.
     let many = |these: String, first: &str| {
         let text = format!("--robot: expected one robot to watch, these are {these}");

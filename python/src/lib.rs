@@ -11,7 +11,7 @@ use morphcog::base::session::Session;
 use morphcog::base::stop::Stopped;
 use morphcog::base::threads::{MOST_THREADS, pool};
 use morphcog::body::{Body, Material};
-use morphcog::cli::output::progress::{Recent, Words, count_line, generation_line};
+use morphcog::cli::output::progress::{ProgressWords, Recent, count_line, generation_line};
 use morphcog::commands::evolve;
 use morphcog::commands::{audit, eval, replay};
 use morphcog::config;
@@ -171,7 +171,7 @@ struct Said {
 
 impl Said {
     /// Replaces the last line if it was of progress, else adds one.
-    fn moved(&mut self, Words { label, parts }: Words) {
+    fn moved(&mut self, ProgressWords { label, parts }: ProgressWords) {
         let line = format!("{label} {}", parts.join(" · "));
         match self.lines.last_mut() {
             Some((PROGRESS, last)) => *last = line,
@@ -405,8 +405,11 @@ impl RunData {
         robot: String,
     ) -> PyResult<(String, String, f64, Bound<'py, PyArray2<u8>>)> {
         let _environment = entered()?;
-        let options =
-            replay::Options { robot, archive: Some(self.place.clone()), ..replay::Options::default() };
+        let options = replay::ReplayOptions {
+            robot,
+            archive: Some(self.place.clone()),
+            ..replay::ReplayOptions::default()
+        };
         let found = replay::find(&options).map_err(|error| raised(&error))?;
         let known = self.run.elites.iter().find(|elite| elite.id == found.name);
         let elite = known
@@ -444,7 +447,7 @@ impl RunData {
     ) -> PyResult<PathBuf> {
         let _environment = entered()?;
         let split: HeldOut = parsed("split", split)?;
-        let options = eval::Options {
+        let options = eval::EvalOptions {
             archives: vec![self.place.clone()],
             robots: parsed("robots", robots)?,
             images: parsed("images", images)?,
@@ -477,7 +480,7 @@ impl RunData {
             let robots = match robots.validated() {
                 None => robots,
                 Some(_) => {
-                    let search = one_by_one::Options {
+                    let search = one_by_one::RobotChoice {
                         robots,
                         archives: vec![self.place.clone()],
                         physical_only: false,
@@ -487,7 +490,7 @@ impl RunData {
                     Selection::Ids(found.into_iter().map(|named| named.robot).collect())
                 }
             };
-            let options = audit::Options {
+            let options = audit::AuditOptions {
                 archive: self.place.clone(),
                 robots,
                 seed: 1,
@@ -509,8 +512,11 @@ impl RunData {
         robot: String,
         make: impl Fn(&replay::Replay, &str) -> Result<T, Error> + Sync,
     ) -> PyResult<T> {
-        let options =
-            replay::Options { robot, archive: Some(self.place.clone()), ..replay::Options::default() };
+        let options = replay::ReplayOptions {
+            robot,
+            archive: Some(self.place.clone()),
+            ..replay::ReplayOptions::default()
+        };
         let pool = pool(None).map_err(|error| raised(&error))?;
         let made = watched(py, |_| {
             pool.install(|| {
@@ -575,7 +581,7 @@ fn evolve_run(
         (_, true) => IfExists::Overwrite,
         _ => IfExists::Refuse,
     };
-    let options = evolve::Options { config, name, out: out.clone(), if_exists };
+    let options = evolve::EvolveOptions { config, name, out: out.clone(), if_exists };
     let unwritten = heard(py, listener, (threads, data), |session| {
         evolve::evolve(&options, session).map(|finished| finished.unwritten)
     })?;

@@ -3,11 +3,11 @@
 use crate::base::Grid;
 use crate::baseline::nearest::nearest;
 use crate::task::fitness::Group;
-use crate::task::grouping::Split;
+use crate::task::grouping::ClassSplit;
 
 /// An image as the sensors see it, with its class.
 #[derive(Clone, Copy, Debug)]
-pub struct Labelled<'a> {
+pub struct LabelledImage<'a> {
     /// H × W in [0, 1].
     pub stimulus: &'a Grid<f64>,
     /// Its class.
@@ -28,20 +28,20 @@ pub struct PixelRule {
 }
 
 /// Returns the accuracy of always answering with the larger group.
-pub fn larger_group(split: &Split, images: &[Labelled]) -> f64 {
+pub fn larger_group(split: &ClassSplit, images: &[LabelledImage]) -> f64 {
     let a = images.iter().filter(|image| split.group(image.class) == Some(Group::A)).count();
     a.max(images.len() - a) as f64 / images.len().max(1) as f64
 }
 
 /// Returns the pixel and threshold that best separate the groups; the first in reading order wins a
 /// tie. Returns `None` without images.
-pub fn best_pixel(split: &Split, images: &[Labelled]) -> Option<PixelRule> {
+pub fn best_pixel(split: &ClassSplit, images: &[LabelledImage]) -> Option<PixelRule> {
     let first = images.first()?.stimulus;
     let total_a = images.iter().filter(|image| split.group(image.class) == Some(Group::A)).count();
     let mut best: Option<(usize, PixelRule)> = None;
     for row in 0..first.height() {
         for column in 0..first.width() {
-            let value = |image: &Labelled| image.stimulus.or_default((row, column));
+            let value = |image: &LabelledImage| image.stimulus.or_default((row, column));
             let mut sorted: Vec<(f64, bool)> =
                 images.iter().map(|i| (value(i), split.group(i.class) == Some(Group::A))).collect();
             sorted.sort_by(|x, y| x.0.total_cmp(&y.0));
@@ -69,8 +69,8 @@ pub fn best_pixel(split: &Split, images: &[Labelled]) -> Option<PixelRule> {
 
 impl PixelRule {
     /// Returns the fraction of images it answers correctly.
-    pub fn accuracy(&self, split: &Split, images: &[Labelled]) -> f64 {
-        let answer = |image: &Labelled| {
+    pub fn accuracy(&self, split: &ClassSplit, images: &[LabelledImage]) -> f64 {
+        let answer = |image: &LabelledImage| {
             let value = image.stimulus.or_default((self.row, self.column));
             if (value > self.level) == (self.above == Group::A) { Group::A } else { Group::B }
         };
@@ -79,7 +79,11 @@ impl PixelRule {
 }
 
 /// Returns the accuracy of answering with the group of the [`nearest`] training image.
-pub fn nearest_training_image(split: &Split, training: &[Labelled], images: &[Labelled]) -> f64 {
+pub fn nearest_training_image(
+    split: &ClassSplit,
+    training: &[LabelledImage],
+    images: &[LabelledImage],
+) -> f64 {
     let known = || training.iter().filter_map(|other| Some((other.stimulus, split.group(other.class)?)));
     share(images, |image| {
         let answer = nearest(known(), image.stimulus);
@@ -87,7 +91,7 @@ pub fn nearest_training_image(split: &Split, training: &[Labelled], images: &[La
     })
 }
 
-fn share(images: &[Labelled], is_right: impl Fn(&Labelled) -> bool) -> f64 {
+fn share(images: &[LabelledImage], is_right: impl Fn(&LabelledImage) -> bool) -> f64 {
     images.iter().filter(|image| is_right(image)).count() as f64 / images.len().max(1) as f64
 }
 
@@ -106,8 +110,8 @@ mod tests {
         let split = &grouping.tasks()[0];
         let zeros = [grid([0.1, 0.9, 0.0, 0.3]), grid([0.8, 0.7, 0.0, 0.4])];
         let others = [grid([0.1, 0.2, 0.0, 0.3]), grid([0.9, 0.4, 0.0, 0.9])];
-        let of = |list: &'static [u8], grids: &'static [Grid<f64>]| -> Vec<Labelled<'static>> {
-            list.iter().zip(grids).map(|(&class, stimulus)| Labelled { stimulus, class }).collect()
+        let of = |list: &'static [u8], grids: &'static [Grid<f64>]| -> Vec<LabelledImage<'static>> {
+            list.iter().zip(grids).map(|(&class, stimulus)| LabelledImage { stimulus, class }).collect()
         };
         let zeros: &'static _ = Box::leak(Box::new(zeros));
         let others: &'static _ = Box::leak(Box::new(others));
@@ -119,7 +123,7 @@ mod tests {
         assert_eq!(larger_group(split, &images[1..]), 2.0 / 3.0);
         assert_eq!(nearest_training_image(split, &images[..3], &images), 0.75);
         // The same image, labelled once as a zero and twice as others.
-        let same = |class: u8| Labelled { class, ..images[0] };
+        let same = |class: u8| LabelledImage { class, ..images[0] };
         let known = [same(0), same(1), same(2)];
         assert_eq!(nearest_training_image(split, &known, &[same(1)]), 1.0);
         assert_eq!(nearest_training_image(split, &known[..2], &[same(0)]), 1.0);

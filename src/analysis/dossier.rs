@@ -18,7 +18,7 @@ use crate::store::names::{CAPACITY_JSON, EVAL_JSON, METRICS, TEAM_JSON};
 use crate::store::run::{Robot, RunFile, different};
 use crate::store::team::{Member, TeamFile};
 use crate::task::protocol::{Protocol, RolloutMode};
-use crate::task::recording::{Recording, Seen};
+use crate::task::recording::{LabelledStimulus, Recording};
 use crate::task::rollout::record;
 use std::path::{Path, PathBuf};
 
@@ -42,7 +42,7 @@ pub struct Dossier {
     /// Results of this run alone.
     pub findings: Findings,
     /// Images for its robots on the page.
-    pub images: Vec<Seen>,
+    pub images: Vec<LabelledStimulus>,
 }
 
 /// Results of tests; `None` for those not done.
@@ -98,9 +98,9 @@ pub struct Team {
     /// Images to watch it with, the first of each class: positions among the file's images.
     pub images: Vec<usize>,
     /// These images as the robots of each run see them.
-    pub seen: Vec<Vec<Seen>>,
+    pub seen: Vec<Vec<LabelledStimulus>>,
     /// These images as all robots see them together.
-    pub together: Vec<Seen>,
+    pub together: Vec<LabelledStimulus>,
 }
 
 /// All data of a page.
@@ -201,9 +201,9 @@ impl Team {
             let one = |place: &usize| {
                 let ImageRef { index, label } = file.images[*place];
                 let stimulus = see(config, &dataset, split, index)?;
-                Ok(Seen { class: label, label: format!("{label} ({split} {index})"), stimulus })
+                Ok(LabelledStimulus { class: label, label: format!("{label} ({split} {index})"), stimulus })
             };
-            images.iter().map(one).collect::<Result<Vec<Seen>, Error>>()
+            images.iter().map(one).collect::<Result<Vec<LabelledStimulus>, Error>>()
         };
         let of_members = of.iter().map(|run| &runs[*run].run.config);
         let together = seen(&Config::together(of_members).expect("the first member's is among them"))?;
@@ -223,7 +223,7 @@ impl Team {
 }
 
 /// Returns the training images, or one per class if there are many.
-fn images(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Vec<Seen>, Error> {
+fn images(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Vec<LabelledStimulus>, Error> {
     let without = |error: Error| match error.remedies.is_empty() {
         true => error.remedy(Remedy::LeaveOutRollouts),
         false => error,
@@ -245,7 +245,7 @@ fn images(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Vec<S
         let seen = see(&run.config, &dataset, Split::Train, image.index);
         let seen =
             seen.map_err(|error| error.in_place("training_images").in_place(&path.display().to_string()));
-        Ok(Seen { class: image.label, label, stimulus: seen? })
+        Ok(LabelledStimulus { class: image.label, label, stimulus: seen? })
     };
     shown.iter().map(one).collect()
 }

@@ -25,7 +25,7 @@ pub struct Progress {
 
 /// Runs that differ in nothing but the seed, and so belong together.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Group<'a> {
+pub struct SettingsGroup<'a> {
     /// What tells it from the others, as "parents=10, 0|1".
     pub label: String,
     /// Its value of each key in which groups differ; none where it has no such key.
@@ -35,7 +35,7 @@ pub struct Group<'a> {
 }
 
 /// Runs in groups, in the order of their first ones, and the keys in which these differ.
-pub fn alike(runs: &[Progress]) -> (Vec<String>, Vec<Group<'_>>) {
+pub fn alike(runs: &[Progress]) -> (Vec<String>, Vec<SettingsGroup<'_>>) {
     let mut groups: Vec<Vec<&Progress>> = Vec::new();
     for run in runs {
         match groups.iter_mut().find(|group| group[0].settings == run.settings) {
@@ -59,7 +59,7 @@ pub fn alike(runs: &[Progress]) -> (Vec<String>, Vec<Group<'_>>) {
     };
     let described: Vec<(String, Vec<Option<String>>)> = groups.iter().map(group).collect();
     let keys = keys.into_iter().collect();
-    let group = |((label, values), runs)| Group { label, values, runs };
+    let group = |((label, values), runs)| SettingsGroup { label, values, runs };
     (keys, described.into_iter().zip(groups).map(group).collect())
 }
 

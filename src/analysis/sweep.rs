@@ -3,19 +3,19 @@
 use crate::analysis::progress::Progress;
 use crate::base::table;
 use crate::store::images::HeldOut;
-use crate::store::task::State;
+use crate::store::task::TaskState;
 use serde::Serialize;
 use std::path::PathBuf;
 
 /// What a task found on one of the tasks that its robots do, as 0|1.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub struct SweepRow {
     /// The task's number in the sweep, from 1.
     pub number: usize,
     /// Its name.
     pub name: String,
     /// How far it is.
-    pub state: State,
+    pub state: TaskState,
     /// Varied keys with its values.
     pub varied: Vec<(String, String)>,
     /// Its run, as far as there is one.
@@ -64,7 +64,7 @@ pub struct Tested {
 #[derive(Clone, Debug)]
 pub struct Collected {
     /// A row per task and what its robots tell apart.
-    pub rows: Vec<Row>,
+    pub rows: Vec<SweepRow>,
     /// How the runs that evolved came along.
     pub progress: Vec<Progress>,
     /// The run.json files, for commands that take several.
@@ -112,7 +112,7 @@ impl<'a> Columns<'a> {
     ];
 
     /// Of a row.
-    pub fn of(row: &'a Row) -> Self {
+    pub fn of(row: &'a SweepRow) -> Self {
         let Some(run) = &row.run else { return Columns::default() };
         let tested = run.tested.as_ref();
         let interval = tested.and_then(|tested| tested.interval);
@@ -137,7 +137,7 @@ impl<'a> Columns<'a> {
 }
 
 /// The table as CSV: a row per task and what its robots tell apart; a column per varied key.
-pub fn csv(rows: &[Row]) -> Vec<u8> {
+pub fn csv(rows: &[SweepRow]) -> Vec<u8> {
     let mut keys: Vec<&String> = rows.iter().flat_map(|row| row.varied.iter().map(|(key, _)| key)).collect();
     keys.sort_unstable();
     keys.dedup();

@@ -7,8 +7,8 @@ use crate::task::answer::Answer;
 use crate::task::answer::{Assignment, Direction};
 use crate::task::fitness::Fitness;
 use crate::task::fitness::Group;
-use crate::task::grouping::Split;
-use crate::task::perturbation::Kind;
+use crate::task::grouping::ClassSplit;
+use crate::task::perturbation::PerturbationKind;
 
 /// Balanced accuracy of a robot that always walks the same way.
 const CHANCE: f64 = 0.5;
@@ -30,7 +30,7 @@ impl<'a> Behaviour<'a> {
     /// Evaluates a robot's unperturbed displacements on its task, under images of these classes.
     pub fn new(
         criteria: &'a Criteria,
-        (split, fitness): (&Split, Fitness),
+        (split, fitness): (&ClassSplit, Fitness),
         classes: &[u8],
         plain: Vec<f64>,
     ) -> Self {
@@ -79,7 +79,12 @@ impl<'a> Behaviour<'a> {
     }
 
     /// Compares a perturbed rollout with the unperturbed one.
-    pub fn compare(&self, name: String, kind: Kind, displacements: Option<Vec<f64>>) -> PerturbedRollout {
+    pub fn compare(
+        &self,
+        name: String,
+        kind: PerturbationKind,
+        displacements: Option<Vec<f64>>,
+    ) -> PerturbedRollout {
         let along = |of: &[f64], image: usize| towards(self.rightward[image], of[image]);
         let (mut kept, mut distance) = (0.0, 0.0);
         if let Some(changed) = &displacements {
@@ -98,9 +103,10 @@ impl<'a> Behaviour<'a> {
         if let Some(flaw) = &self.flaw {
             return (Verdict::NotAWalker, flaw.clone());
         }
-        let failed =
-            |kind: &&Kind| rollouts.iter().any(|rollout| rollout.kind == **kind && !rollout.persists);
-        let failed: Vec<Kind> = Kind::ALL.iter().filter(failed).copied().collect();
+        let failed = |kind: &&PerturbationKind| {
+            rollouts.iter().any(|rollout| rollout.kind == **kind && !rollout.persists)
+        };
+        let failed: Vec<PerturbationKind> = PerturbationKind::ALL.iter().filter(failed).copied().collect();
         let world = || rollouts.iter().filter(|rollout| rollout.kind.is_of_the_world());
         let robust = world().filter(|rollout| rollout.persists).count() as f64;
         let is_robust = robust >= self.criteria.least_robust * world().count() as f64;
@@ -145,12 +151,13 @@ mod tests {
     use crate::task::fitness::Fitness;
     use crate::task::grouping::Grouping;
 
-    fn judged(rollouts: &[(Kind, [f64; 2])]) -> (Verdict, String) {
+    fn judged(rollouts: &[(PerturbationKind, [f64; 2])]) -> (Verdict, String) {
         let criteria = Criteria::default();
         let split = Grouping::two_groups(&[0], &[1]).unwrap().tasks()[0].clone();
         let behaviour = Behaviour::new(&criteria, (&split, Fitness::Min), &[0, 1], vec![-10.0, 12.0]);
-        let rollout =
-            |(kind, d): &(Kind, [f64; 2])| behaviour.compare(String::new(), *kind, Some(d.to_vec()));
+        let rollout = |(kind, d): &(PerturbationKind, [f64; 2])| {
+            behaviour.compare(String::new(), *kind, Some(d.to_vec()))
+        };
         behaviour.judge(&rollouts.iter().map(rollout).collect::<Vec<_>>())
     }
 
@@ -159,18 +166,24 @@ mod tests {
 
     #[test]
     fn who_keeps_its_directions_in_all_rollouts_is_physical() {
-        let rollouts = Kind::ALL.map(|kind| (kind, SAME));
+        let rollouts = PerturbationKind::ALL.map(|kind| (kind, SAME));
         assert_eq!(judged(&rollouts).0, Verdict::Physical);
     }
 
     #[test]
     fn who_is_broken_by_the_simulator_alone_exploits_it_and_by_the_world_is_fragile() {
-        let but =
-            |lost: &[Kind]| judged(&Kind::ALL.map(|k| (k, if lost.contains(&k) { LOST } else { SAME })));
-        assert_eq!(but(&[Kind::TimeStep]), (Verdict::Exploits, "time step".to_string()));
-        assert_eq!(but(&[Kind::Start, Kind::LengthLimits]).1, "start, length limits");
-        assert_eq!(but(&[Kind::Gravity]), (Verdict::Fragile, "gravity".to_string()));
-        let all = but(&[Kind::Gravity, Kind::Pixel, Kind::Friction, Kind::TimeStep]);
+        let but = |lost: &[PerturbationKind]| {
+            judged(&PerturbationKind::ALL.map(|k| (k, if lost.contains(&k) { LOST } else { SAME })))
+        };
+        assert_eq!(but(&[PerturbationKind::TimeStep]), (Verdict::Exploits, "time step".to_string()));
+        assert_eq!(but(&[PerturbationKind::Start, PerturbationKind::LengthLimits]).1, "start, length limits");
+        assert_eq!(but(&[PerturbationKind::Gravity]), (Verdict::Fragile, "gravity".to_string()));
+        let all = but(&[
+            PerturbationKind::Gravity,
+            PerturbationKind::Pixel,
+            PerturbationKind::Friction,
+            PerturbationKind::TimeStep,
+        ]);
         assert_eq!(all, (Verdict::Fragile, "friction, gravity, pixel noise, time step".to_string()));
     }
 
@@ -179,7 +192,8 @@ mod tests {
         let criteria = Criteria::default();
         let split = Grouping::two_groups(&[0], &[1]).unwrap().tasks()[0].clone();
         let behaviour = Behaviour::new(&criteria, (&split, Fitness::Min), &[0, 1], vec![-10.0, 12.0]);
-        let compare = |d: Option<[f64; 2]>| behaviour.compare("x".into(), Kind::Start, d.map(Vec::from));
+        let compare =
+            |d: Option<[f64; 2]>| behaviour.compare("x".into(), PerturbationKind::Start, d.map(Vec::from));
         assert!(compare(Some([-9.0, 30.0])).persists);
         // Below the threshold for an answer.
         assert!(compare(Some([-9.0, 2.9])).persists && !compare(Some([-9.0, 1.5])).persists);

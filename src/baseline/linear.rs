@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// A stimulus with its class.
-pub type Labelled<'a> = (&'a Grid<f64>, u8);
+pub type LabelledPixels<'a> = (&'a Grid<f64>, u8);
 
 /// Weight of the penalty on the size of the weights, relative to the mean square of a pixel over
 /// the images: enough for pixels that are always dark.
@@ -15,7 +15,7 @@ const RIDGE: f64 = 1e-3;
 
 /// Sums over the training images of each class: all that least squares need.
 #[derive(Clone, Debug)]
-pub struct Moments {
+pub struct PixelMoments {
     /// Number of pixels of an image, plus one for the constant 1.
     size: usize,
     /// Sum of *x xᵀ* over a class's images; its last column is the sum of *x*.
@@ -35,9 +35,9 @@ fn sparse(stimulus: &Grid<f64>) -> Vec<(usize, f64)> {
     lit.chain([(pixels.len(), 1.0)]).collect()
 }
 
-impl Moments {
+impl PixelMoments {
     /// Sums up training images, all of one size.
-    pub fn new(images: &[Labelled]) -> Self {
+    pub fn new(images: &[LabelledPixels]) -> Self {
         let size = images.first().map_or(0, |(stimulus, _)| stimulus.cells().len()) + 1;
         let mut classes: Vec<u8> = images.iter().map(|(_, class)| *class).collect();
         classes.sort_unstable();
@@ -55,7 +55,7 @@ impl Moments {
             sum.fill_lower_triangle_with_upper_triangle();
             (class, sum)
         };
-        Moments { size, by_class: classes.into_par_iter().map(of_class).collect() }
+        PixelMoments { size, by_class: classes.into_par_iter().map(of_class).collect() }
     }
 
     /// Returns the linear function closest in square to 1 under images of one group's classes, and
@@ -102,7 +102,7 @@ mod tests {
         (0..140).map(of).collect()
     }
 
-    fn labelled(images: &[(Grid<f64>, u8)]) -> Vec<Labelled<'_>> {
+    fn labelled(images: &[(Grid<f64>, u8)]) -> Vec<LabelledPixels<'_>> {
         images.iter().map(|(stimulus, class)| (stimulus, *class)).collect()
     }
 
@@ -110,7 +110,7 @@ mod tests {
     fn least_squares_recover_a_planted_plane() {
         // The mean of ±1 over equally many images of uninformative pixels is the plane itself.
         let images = images();
-        let linear = Moments::new(&labelled(&images)).apart(&[0], &[1]);
+        let linear = PixelMoments::new(&labelled(&images)).apart(&[0], &[1]);
         let right =
             images.iter().filter(|(image, class)| (linear.value(image) > 0.0) == (*class == 0)).count();
         assert!(right >= 120, "{right} of 140");
@@ -127,7 +127,7 @@ mod tests {
     #[test]
     fn pixels_that_are_always_dark_do_no_harm() {
         let dark: Vec<(Grid<f64>, u8)> = (0..4).map(|k| (Grid::filled(2, 2, 0.0), k % 2)).collect();
-        let value = Moments::new(&labelled(&dark)).apart(&[0], &[1]).value(&dark[0].0);
+        let value = PixelMoments::new(&labelled(&dark)).apart(&[0], &[1]).value(&dark[0].0);
         assert!(value.abs() < 1e-12);
     }
 }

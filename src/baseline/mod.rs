@@ -8,5 +8,5 @@ pub mod network;
 pub mod settings;
 pub mod training;
 
-pub use settings::{Activation, Hyperparameters, Kind, Pooling, Trained, Watch};
+pub use settings::{Activation, Hyperparameters, NetworkKind, Pooling, Trained, Watch};
 pub use training::{Samples, SamplesError, train};

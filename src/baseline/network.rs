@@ -4,7 +4,7 @@
 
 use crate::base::Grid;
 use crate::base::random::Stream;
-use crate::baseline::settings::{Activation, Kind, Pooling};
+use crate::baseline::settings::{Activation, NetworkKind, Pooling};
 use nalgebra::{DVector, DVectorView};
 use std::ops::Range;
 
@@ -56,7 +56,7 @@ impl Pooling {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shape {
     /// Its kind.
-    pub kind: Kind,
+    pub kind: NetworkKind,
     /// Number of hidden neurons or kernels, 1 or more.
     pub size: usize,
     /// Rows and columns of an image.
@@ -76,8 +76,8 @@ impl Shape {
     /// Returns the rows and columns of an image that a hidden unit covers at one place.
     fn field(&self) -> (usize, usize) {
         match self.kind {
-            Kind::Mlp => self.image,
-            Kind::Cnn => (self.kernel, self.kernel),
+            NetworkKind::Mlp => self.image,
+            NetworkKind::Cnn => (self.kernel, self.kernel),
         }
     }
 
@@ -91,8 +91,8 @@ impl Shape {
     fn pooled(&self) -> [(usize, usize); 2] {
         let (rows, columns) = (self.image.0 + 1 - self.field().0, self.image.1 + 1 - self.field().1);
         let window = match self.kind {
-            Kind::Mlp => (1, 1),
-            Kind::Cnn => self.pooling.window((rows, columns)),
+            NetworkKind::Mlp => (1, 1),
+            NetworkKind::Cnn => self.pooling.window((rows, columns)),
         };
         [window, (rows / window.0, columns / window.1)]
     }
@@ -388,12 +388,12 @@ mod tests {
 
     fn shapes() -> impl Iterator<Item = Shape> {
         let layers = [
-            (Kind::Mlp, Pooling::None),
-            (Kind::Mlp, Pooling::Mean),
-            (Kind::Cnn, Pooling::None),
-            (Kind::Cnn, Pooling::Max2),
-            (Kind::Cnn, Pooling::Mean),
-            (Kind::Cnn, Pooling::Max),
+            (NetworkKind::Mlp, Pooling::None),
+            (NetworkKind::Mlp, Pooling::Mean),
+            (NetworkKind::Cnn, Pooling::None),
+            (NetworkKind::Cnn, Pooling::Max2),
+            (NetworkKind::Cnn, Pooling::Mean),
+            (NetworkKind::Cnn, Pooling::Max),
         ];
         [Activation::Relu, Activation::Tanh, Activation::Sigmoid].into_iter().flat_map(move |activation| {
             layers.map(|(kind, pooling)| Shape {
@@ -440,7 +440,7 @@ mod tests {
                 rows.flat_map(|row| columns.clone().map(move |column| (row, column))).collect::<Vec<_>>()
             };
             let windows: Vec<Vec<(usize, usize)>> = match (shape.kind, shape.pooling) {
-                (Kind::Mlp, _) => vec![vec![(0, 0)]],
+                (NetworkKind::Mlp, _) => vec![vec![(0, 0)]],
                 (_, Pooling::None) => corners(0..5, 0..4).into_iter().map(|corner| vec![corner]).collect(),
                 (_, Pooling::Max2) => corners(0..2, 0..2)
                     .into_iter()

@@ -6,22 +6,22 @@ use serde::{Deserialize, Serialize};
 /// Kinds of network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum NetworkKind {
     /// One hidden layer; its size is the number of hidden neurons.
     Mlp,
     /// One convolution and an output head; its size is the number of kernels.
     Cnn,
 }
 
-impl Kind {
+impl NetworkKind {
     /// All kinds.
-    pub const ALL: [Kind; 2] = [Kind::Mlp, Kind::Cnn];
+    pub const ALL: [NetworkKind; 2] = [NetworkKind::Mlp, NetworkKind::Cnn];
 
     /// Returns its name in files.
     pub fn name(self) -> &'static str {
         match self {
-            Kind::Mlp => "mlp",
-            Kind::Cnn => "cnn",
+            NetworkKind::Mlp => "mlp",
+            NetworkKind::Cnn => "cnn",
         }
     }
 }

@@ -5,7 +5,7 @@ use crate::base::random::Stream;
 use crate::base::session::Session;
 use crate::base::stop::Stopped;
 use crate::baseline::network::{Network, Patches, Shape, cross_entropy};
-use crate::baseline::settings::{Hyperparameters, Kind, Trained, Watch};
+use crate::baseline::settings::{Hyperparameters, NetworkKind, Trained, Watch};
 use nalgebra::DVector;
 
 /// Images with their groups (0 or 1), prepared for networks of a kind.
@@ -39,7 +39,7 @@ impl Samples {
     /// Returns an error if there are no images, or if they differ in size.
     pub fn new(
         images: &[(&Grid<f64>, usize)],
-        kind: Kind,
+        kind: NetworkKind,
         hyper: &Hyperparameters,
     ) -> Result<Self, SamplesError> {
         let size = |(image, _): &(&Grid<f64>, usize)| (image.height(), image.width());
@@ -168,7 +168,7 @@ mod tests {
     use std::sync::atomic::AtomicBool;
 
     /// Makes noisy images that are brighter at the top, or at the bottom.
-    fn samples(seed: u64, count: usize, kind: Kind, hyper: &Hyperparameters) -> Samples {
+    fn samples(seed: u64, count: usize, kind: NetworkKind, hyper: &Hyperparameters) -> Samples {
         let rng = &mut stream(seed, Purpose::Networks, 0, 0);
         let groups: Vec<usize> = (0..count).map(|number| usize::from(number % 3 == 0)).collect();
         let images: Vec<Grid<f64>> = groups
@@ -183,7 +183,7 @@ mod tests {
         Samples::new(&images.iter().zip(groups).collect::<Vec<_>>(), kind, hyper).unwrap()
     }
 
-    fn trained(kind: Kind, hyper: &Hyperparameters, seed: u64) -> Trained {
+    fn trained(kind: NetworkKind, hyper: &Hyperparameters, seed: u64) -> Trained {
         let [learn, test] = [(1, 12), (2, 150)].map(|(seed, count)| samples(seed, count, kind, hyper));
         let rng = &mut stream(seed, Purpose::Networks, 1, 0);
         train(8, hyper, &learn, &test, &test, rng, &Session::default()).unwrap()
@@ -191,7 +191,7 @@ mod tests {
 
     #[test]
     fn both_kinds_learn_what_can_be_learnt() {
-        for kind in Kind::ALL {
+        for kind in NetworkKind::ALL {
             for watch in [Watch::Accuracy, Watch::Loss] {
                 let hyper = Hyperparameters {
                     learning_rate: 0.01,
@@ -212,7 +212,7 @@ mod tests {
         let best = Hyperparameters { restore_best: true, ..last };
         let mut better = 0;
         for seed in 0..8 {
-            let [last, best] = [last, best].map(|hyper| trained(Kind::Mlp, &hyper, seed));
+            let [last, best] = [last, best].map(|hyper| trained(NetworkKind::Mlp, &hyper, seed));
             assert!(best.accuracy >= last.accuracy && best.epochs == last.epochs && best.epochs < 50);
             better += usize::from(best.accuracy > last.accuracy);
         }
@@ -224,7 +224,7 @@ mod tests {
     fn trained_parameters_are_pinned_to_the_bit() {
         use crate::baseline::{Activation, Pooling};
         let mut bits = String::new();
-        for kind in Kind::ALL {
+        for kind in NetworkKind::ALL {
             for (activation, pooling) in [
                 (Activation::Relu, Pooling::None),
                 (Activation::Tanh, Pooling::Max2),
@@ -251,7 +251,7 @@ mod tests {
     #[test]
     fn a_training_is_stopped_between_images() {
         let hyper = Hyperparameters { epochs: 1_000_000, patience: 1_000_000, ..Default::default() };
-        let [learn, test] = [12, 150].map(|count| samples(1, count, Kind::Cnn, &hyper));
+        let [learn, test] = [12, 150].map(|count| samples(1, count, NetworkKind::Cnn, &hyper));
         let rng = &mut stream(1, Purpose::Networks, 1, 0);
         let stop = AtomicBool::new(false);
         let begin = std::time::Instant::now();
@@ -270,7 +270,10 @@ mod tests {
     fn no_images_and_images_of_several_sizes_are_refused() {
         let [image, other] = [(6, 6), (6, 7)].map(|(rows, columns)| Grid::from_fn(rows, columns, |_, _| 0.5));
         let new = |images: &[(&Grid<f64>, usize)]| {
-            Samples::new(images, Kind::Mlp, &Hyperparameters::default()).map(|_| ()).unwrap_err().to_string()
+            Samples::new(images, NetworkKind::Mlp, &Hyperparameters::default())
+                .map(|_| ())
+                .unwrap_err()
+                .to_string()
         };
         assert_eq!(new(&[]), "expected images, found none");
         assert_eq!(new(&[(&image, 0), (&other, 1)]), "expected images of 6 × 6 pixels, found 6 × 7");

@@ -17,7 +17,7 @@ use crate::cli::train::TrainArgs;
 use crate::cli::values::{MOST, decimal, held_out, offering, seed, threads, whole};
 use crate::cli::{audit, capacity, demo, plot, report, reproduce, response, serve, sweep, team, train};
 use crate::commands::plan::PAPER_TOML;
-use crate::commands::replay::Shown;
+use crate::commands::replay::ShownImage;
 use crate::commands::schema;
 use crate::config;
 use crate::data::catalogue::FETCHABLE;
@@ -358,7 +358,7 @@ pub(super) struct ReplayArgs {
     pub(super) archive: Option<Runs>,
     /// Images by index, such as train:1,test:17 (default: the training images).
     #[arg(short, long, value_delimiter = ',')]
-    pub(super) images: Vec<Shown>,
+    pub(super) images: Vec<ShownImage>,
     /// A dataset other than the run's, such as builtin.
     #[arg(long)]
     pub(super) dataset: Option<String>,

@@ -11,7 +11,7 @@ use crate::cli::output::verdicts;
 use crate::cli::values::{seed, threads};
 use crate::cli::{Resources, in_session};
 use crate::commands::audit;
-use crate::commands::audit::{Finished, Options};
+use crate::commands::audit::{AuditOptions, AuditOutcome};
 use crate::config::audit::Criteria;
 use crate::robots;
 use crate::robots::selection::Selection;
@@ -90,7 +90,7 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
             Some(best) => validated(&args, (&archive, best), ranks, console)?,
             None => robots,
         };
-        let options = Options {
+        let options = AuditOptions {
             archive,
             robots,
             seed: args.seed,
@@ -118,8 +118,8 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
     Ok(())
 }
 
-fn say_known(finished: &Finished, out: &Path, console: &Console) {
-    let Finished { known, shipped, .. } = finished;
+fn say_known(finished: &AuditOutcome, out: &Path, console: &Console) {
+    let AuditOutcome { known, shipped, .. } = finished;
     if *known == 0 {
         return;
     }
@@ -138,7 +138,7 @@ fn validated(
     ranks: Ranks,
     console: &Console,
 ) -> Result<Selection, Error> {
-    let options = validation::Options { archive: archive.to_path_buf(), best: Some(best) };
+    let options = validation::ValidationOptions { archive: archive.to_path_buf(), best: Some(best) };
     let with = Resources { ranks, ..Resources::of(args.threads, args.data.clone()) };
     let found = in_session(console, with, |session| validation::validate(&options, session))?;
     let all_know = ranks.all(found.is_some());

@@ -7,7 +7,7 @@ use crate::cli::output::networks;
 use crate::cli::values::threads;
 use crate::cli::{Resources, in_session};
 use crate::commands::capacity;
-use crate::commands::capacity::Options;
+use crate::commands::capacity::CapacityOptions;
 use crate::config::capacity::CapacityConfig;
 use crate::store::capacity::CapacityFile;
 use crate::store::folder;
@@ -63,7 +63,7 @@ pub(super) fn run(args: CapacityArgs, console: &Console) -> Result<(), Error> {
     let eval = args.eval.map_or_else(newest, Ok)?;
     let mut set = args.set;
     set.extend(args.clean.then(|| "clean=true".to_string()));
-    let options = Options {
+    let options = CapacityOptions {
         config: CapacityConfig::load(args.config.as_deref(), &set)?,
         physical_only: args.physical_only,
         out: args.out.unwrap_or_else(|| CapacityFile::beside(&eval)),
@@ -71,7 +71,7 @@ pub(super) fn run(args: CapacityArgs, console: &Console) -> Result<(), Error> {
     };
     let with = Resources::of(args.threads, args.data);
     let finished = in_session(console, with, |session| capacity::capacity(&options, session))?;
-    let capacity::Finished { file, unwritten } = finished;
+    let capacity::CapacityOutcome { file, unwritten } = finished;
     networks::capacity(console, &file, unwritten.is_none().then_some(options.out.as_path()));
     if let Some(error) = unwritten {
         return Err(error);

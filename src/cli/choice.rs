@@ -66,7 +66,7 @@ pub(super) fn selected(mut given: Vec<Selection>) -> Result<Option<Selection>, E
 
 /// Returns the robots of a selection, for a command that handles them one by one.
 pub(super) fn one_by_one(
-    search: &one_by_one::Options,
+    search: &one_by_one::RobotChoice,
     data: Option<PathBuf>,
     console: &Console,
 ) -> Result<Vec<Named>, Error> {

@@ -7,7 +7,7 @@ use crate::cli::output::summary;
 use crate::cli::values::{seed, threads};
 use crate::cli::{Resources, in_session};
 use crate::cli::{replay_best, test};
-use crate::commands::replay::Shown;
+use crate::commands::replay::ShownImage;
 use crate::commands::train;
 use crate::commands::{eval, replay};
 use crate::data::builtin::BuiltinDigits;
@@ -71,7 +71,7 @@ pub(super) struct DemoArgs {
 }
 
 pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
-    let options = train::Options {
+    let options = train::TrainOptions {
         archive: folder::first_run(PathBuf::from(gallery::GAITS)).map_err(Error::other)?,
         robots: Selection::Ids(vec![BEST.to_string()]),
         groups: [vec![0], vec![1]].into(),
@@ -91,7 +91,7 @@ pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
         })?;
     summary::training(console, &finished, &options.out);
     let archive = options.out.join(RUN_JSON);
-    let tested = eval::Options {
+    let tested = eval::EvalOptions {
         out: archive.with_file_name(EVAL_JSON),
         archives: vec![archive],
         robots: options.robots,
@@ -104,16 +104,16 @@ pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
         dataset: None,
     };
     test(&tested, with, console)?;
-    let shown = replay::Options { images: new_digits()?, ..replay::Options::default() };
+    let shown = replay::ReplayOptions { images: new_digits()?, ..replay::ReplayOptions::default() };
     replay_best(&options.out, shown, console)
 }
 
 /// Returns a zero and a one of the test digits.
-fn new_digits() -> Result<Vec<Shown>, Error> {
+fn new_digits() -> Result<Vec<ShownImage>, Error> {
     let digits = Dataset::builtin(BuiltinDigits::default(), &[Split::Test]);
     let digits = digits.map_err(|error| Error::other(error.to_string()))?;
     let first = |class: u8| digits.indices_of(Split::Test, class).first().copied();
-    Ok([0, 1].into_iter().filter_map(first).map(|index| Shown { split: Split::Test, index }).collect())
+    Ok([0, 1].into_iter().filter_map(first).map(|index| ShownImage { split: Split::Test, index }).collect())
 }
 
 #[cfg(test)]

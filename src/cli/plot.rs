@@ -10,8 +10,8 @@ use crate::cli::output::reporters::Reporter;
 use crate::cli::output::sweeps;
 use crate::cli::values::{MOST, offering, seed, whole};
 use crate::commands::plot;
-use crate::commands::plot::{Kind, Wanted};
-use crate::commands::replay::{Options, Shown};
+use crate::commands::plot::{FigureKind, PlotOptions};
+use crate::commands::replay::{ReplayOptions, ShownImage};
 use crate::draw::plot::Background;
 use crate::robots::selection::{BEST, Selection};
 use crate::search::one_by_one;
@@ -47,8 +47,8 @@ Examples:
 #[derive(Debug, Args)]
 pub(super) struct PlotArgs {
     /// Kind of figure.
-    #[arg(value_parser = offering(Kind::ALL.map(|(_, name)| name), str::parse::<Kind>))]
-    kind: Kind,
+    #[arg(value_parser = offering(FigureKind::ALL.map(|(_, name)| name), str::parse::<FigureKind>))]
+    kind: FigureKind,
     #[command(flatten)]
     archives: Archives,
     #[arg(short, long, visible_aliases = ["robots", "select"], help = format!("{ROBOTS} [default: best]"))]
@@ -61,7 +61,7 @@ pub(super) struct PlotArgs {
     physical_only: bool,
     /// Images by index, such as train:1,test:17 (default: the training images).
     #[arg(short, long, value_delimiter = ',')]
-    images: Vec<Shown>,
+    images: Vec<ShownImage>,
     /// A dataset other than the run's, such as builtin.
     #[arg(long)]
     dataset: Option<String>,
@@ -97,15 +97,15 @@ pub(super) fn run(args: PlotArgs, console: &Console) -> Result<(), Error> {
         robots => {
             let robots = robots.unwrap_or(Selection::Ids(vec![BEST.to_string()]));
             let archives = archives.clone();
-            let search = one_by_one::Options { robots, archives, physical_only, seed: args.seed };
+            let search = one_by_one::RobotChoice { robots, archives, physical_only, seed: args.seed };
             choice::one_by_one(&search, data.clone(), console)?
         }
     };
-    let wanted = Wanted {
+    let wanted = PlotOptions {
         kind,
         archives,
         robots,
-        options: Options { physical_only, images, data, dataset, ..Options::default() },
+        options: ReplayOptions { physical_only, images, data, dataset, ..ReplayOptions::default() },
         every: args.every.map_or(0, |steps| steps as usize),
         out: args.out,
         dpi: args.dpi,

@@ -8,10 +8,10 @@ use crate::cli::output::console::Console;
 use crate::cli::output::networks;
 use crate::cli::tasks::{Command, What, Where, asked, ended};
 use crate::cli::values::decimal;
-use crate::commands::plan::{PAPER_TOML, Plan};
+use crate::commands::plan::{PAPER_TOML, PaperPlan};
 use crate::commands::reproduce;
-use crate::commands::reproduce::Options;
-use crate::commands::tasks::Place;
+use crate::commands::reproduce::ReproduceOptions;
+use crate::commands::tasks::TaskFolders;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -49,10 +49,10 @@ pub(super) struct ReproduceArgs {
 }
 
 pub(super) fn run(args: ReproduceArgs, console: &Console) -> Result<(), Error> {
-    let plan = Plan::load(&args.plan, &args.set)?;
+    let plan = PaperPlan::load(&args.plan, &args.set)?;
     let tasks = reproduce::tasks(&plan, args.scale)?;
-    let place = Place { out: args.out.clone() };
-    let name = if Plan::is_built_in(&args.plan) { args.plan.clone() } else { absolute(&args.plan)? };
+    let place = TaskFolders { out: args.out.clone() };
+    let name = if PaperPlan::is_built_in(&args.plan) { args.plan.clone() } else { absolute(&args.plan)? };
     let mut words = ["reproduce", &name, "--scale", &args.scale.to_string()].map(quoted).to_vec();
     words.extend(args.set.iter().flat_map(|set| ["--set".to_string(), quoted(set)]));
     if asked(
@@ -68,7 +68,7 @@ pub(super) fn run(args: ReproduceArgs, console: &Console) -> Result<(), Error> {
         return Ok(());
     }
     let jobs = args.place.jobs.map(usize::from);
-    let options = Options { plan, scale: args.scale, place, jobs };
+    let options = ReproduceOptions { plan, scale: args.scale, place, jobs };
     let finished = in_session(console, args.place.with(), |session| reproduce::reproduce(&options, session))?;
     ended(&finished.runs, tasks.len())?;
     if finished.stopped {

@@ -9,7 +9,7 @@ use crate::cli::output::responses;
 use crate::cli::values::{MOST, decimal, seed, threads, whole};
 use crate::cli::{Resources, in_session};
 use crate::commands::response;
-use crate::commands::response::Options;
+use crate::commands::response::ResponseOptions;
 use crate::robots;
 use crate::robots::selection::{BEST, Selection};
 use crate::search::one_by_one;
@@ -85,7 +85,7 @@ pub(super) fn run(args: ResponseArgs, console: &Console) -> Result<(), Error> {
     let robots = selected(args.robots)?.unwrap_or(Selection::Ids(vec![BEST.to_string()]));
     let (archives, robots) = robots::archives(args.archive.into_iter().collect(), robots)?;
     let [archive] = archives.try_into().expect("one is named, or else there is one");
-    let search = one_by_one::Options {
+    let search = one_by_one::RobotChoice {
         robots,
         archives: vec![archive.clone()],
         physical_only: args.physical_only,
@@ -93,7 +93,7 @@ pub(super) fn run(args: ResponseArgs, console: &Console) -> Result<(), Error> {
     };
     let robots = choice::one_by_one(&search, args.data.clone(), console)?;
     let out = args.out.unwrap_or_else(|| folder::beside(&archive, RESPONSE_JSON));
-    let options = Options {
+    let options = ResponseOptions {
         robots: robots.into_iter().map(|Named { robot, .. }| robot).collect(),
         physical_only: args.physical_only,
         task: args.task,

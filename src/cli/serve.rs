@@ -8,7 +8,7 @@ use crate::cli::output::console::Console;
 use crate::cli::values::whole;
 use crate::serve::hosts::{HostName, Hosts};
 use crate::serve::server::Server;
-use crate::serve::{Options, Service};
+use crate::serve::{ServeOptions, Service};
 use crate::store::folder;
 use clap::Args;
 use std::path::PathBuf;
@@ -54,7 +54,7 @@ pub(super) fn run(args: ServeArgs, console: &Console) -> Result<(), Error> {
     let stop = signals::stop_flag()?;
     let shown: Vec<_> = archives.iter().chain(&newest).cloned().collect();
     let hosts = Hosts::new(args.allow_host, ADVICE);
-    let options = Options { archives, newest, data: args.data, runs: folder::RUNS.into(), hosts };
+    let options = ServeOptions { archives, newest, data: args.data, runs: folder::RUNS.into(), hosts };
     let (service, notes) = Service::open(&options)?;
     let server = Server::bind(service, args.port)?;
     choice::warn_of_versions(&shown, console);

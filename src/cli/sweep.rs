@@ -8,7 +8,7 @@ use crate::cli::output::console::Console;
 use crate::cli::output::sweeps;
 use crate::cli::tasks::{Command, What, Where, asked, ended, refused, warn_of_gaits};
 use crate::commands::sweep::SweepPlan;
-use crate::commands::tasks::Place;
+use crate::commands::tasks::TaskFolders;
 use crate::commands::{collect, tasks};
 use crate::store::folder;
 use clap::Args;
@@ -69,7 +69,7 @@ pub(super) fn run(args: SweepArgs, console: &Console) -> Result<(), Error> {
     let tasks = plan.tasks(&args.plan).map_err(|errors| refused(errors, console))?;
     let name = args.plan.file_stem().map_or("sweep".to_string(), |stem| stem.to_string_lossy().into_owned());
     let out = args.out.unwrap_or_else(|| Path::new(folder::RUNS).join(&name));
-    let place = Place { out: out.clone() };
+    let place = TaskFolders { out: out.clone() };
     let absolute = std::path::absolute(&args.plan).map_err(|error| Error::reading(&args.plan, &error))?;
     let mut words = vec!["sweep".to_string(), in_shell(&absolute)];
     words.extend(args.set.iter().flat_map(|set| ["--set".to_string(), quoted(set)]));

@@ -9,7 +9,7 @@ use crate::cli::values::{MOST, threads, whole};
 use crate::cli::{Resources, in_session};
 use crate::cli::{choice, process};
 use crate::commands::tasks;
-use crate::commands::tasks::{Place, Run, Summary, Task};
+use crate::commands::tasks::{Run, Task, TaskFolders, TasksSummary};
 use crate::shipped::atlas;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -72,8 +72,8 @@ pub(super) struct Command<'a> {
     pub(super) name: &'a str,
     /// Its tasks.
     pub(super) tasks: &'a [Task],
-    /// Place of the tasks.
-    pub(super) place: &'a Place,
+    /// Folders of the tasks.
+    pub(super) place: &'a TaskFolders,
     /// Resources of the tasks.
     pub(super) with: &'a Where,
 }
@@ -242,8 +242,8 @@ fn from_engine() -> Result<usize, Error> {
 ///
 /// # Errors
 /// Returns an error if some failed or were stopped.
-pub(super) fn ended(summary: &Summary, count: usize) -> Result<(), Error> {
-    let Summary { done, failed, elsewhere, open } = summary;
+pub(super) fn ended(summary: &TasksSummary, count: usize) -> Result<(), Error> {
+    let TasksSummary { done, failed, elsewhere, open } = summary;
     if !failed.is_empty() {
         let numbers: Vec<String> = failed.iter().map(usize::to_string).collect();
         let (count_failed, numbers) = (failed.len(), numbers.join(", "));

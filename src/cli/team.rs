@@ -10,7 +10,7 @@ use crate::cli::output::teams;
 use crate::cli::values::{held_out, seed, threads};
 use crate::cli::{Resources, in_session};
 use crate::commands::team;
-use crate::commands::team::Options;
+use crate::commands::team::TeamOptions;
 use crate::robots::selection::{BEST, Selection};
 use crate::shipped::gallery;
 use crate::store::folder;
@@ -80,7 +80,7 @@ pub(super) fn run(args: TeamArgs, console: &Console) -> Result<(), Error> {
         console.line(&format!("no --archive: the {} robots of {}", archives.len(), gallery::TEAM));
     }
     choice::say_simulated(&archives, console);
-    let options = Options {
+    let options = TeamOptions {
         robots: selected(args.robots)?.unwrap_or(Selection::Ids(vec![BEST.to_string()])),
         classes: (!args.classes.is_empty()).then_some(args.classes),
         images: args.images,
@@ -90,7 +90,7 @@ pub(super) fn run(args: TeamArgs, console: &Console) -> Result<(), Error> {
         archives,
     };
     let with = Resources::of(args.threads, args.data);
-    let team::Finished { file, unwritten } =
+    let team::TeamOutcome { file, unwritten } =
         in_session(console, with, |session| team::team(&options, session))?;
     teams::team(console, &file, unwritten.is_none().then_some(options.out.as_path()))?;
     if let Some(error) = unwritten {

@@ -13,7 +13,7 @@ use crate::cli::{Resources, in_session};
 use crate::commands::audit;
 use crate::commands::evolve;
 use crate::commands::train;
-use crate::commands::train::{Finished, Options};
+use crate::commands::train::{TrainOptions, TrainOutcome};
 use crate::config::audit::Criteria;
 use crate::images::whereabouts::Whereabouts;
 use crate::robots::selection::Selection;
@@ -92,8 +92,16 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
         (_, true) => IfExists::Overwrite,
         _ => IfExists::Refuse,
     };
-    let options =
-        Options { archive, robots, groups: args.task, seed: args.seed, set: args.set, name, out, if_exists };
+    let options = TrainOptions {
+        archive,
+        robots,
+        groups: args.task,
+        seed: args.seed,
+        set: args.set,
+        name,
+        out,
+        if_exists,
+    };
     trained(&options, Resources::of(args.threads, args.data), console)
 }
 
@@ -116,8 +124,11 @@ fn name(archive: &Path, [a, b]: &[Vec<u8>; 2], seed: Option<u64>) -> String {
 /// # Errors
 /// Returns an error if the config does not have two groups that can be trained, if several
 /// processes would share the training, or if its folder holds a run.
-pub(super) fn after_evolution(evolution: &evolve::Options, session: &Session) -> Result<Options, Error> {
-    let evolve::Options { config, out, if_exists, .. } = evolution;
+pub(super) fn after_evolution(
+    evolution: &evolve::EvolveOptions,
+    session: &Session,
+) -> Result<TrainOptions, Error> {
+    let evolve::EvolveOptions { config, out, if_exists, .. } = evolution;
     if session.ranks.size() > 1 {
         let text = "--train: expected one process: several cannot share a training".to_string();
         return Err(Error::usage(text).advice("evolve first, then morphcog train without mpirun"));
@@ -135,7 +146,7 @@ pub(super) fn after_evolution(evolution: &evolve::Options, session: &Session) ->
     if *if_exists == IfExists::Refuse {
         folder::vacant(&of_training)?;
     }
-    Ok(Options {
+    Ok(TrainOptions {
         out: of_training,
         archive,
         robots: Selection::Top(GAITS),
@@ -148,10 +159,10 @@ pub(super) fn after_evolution(evolution: &evolve::Options, session: &Session) ->
 }
 
 /// Trains, validates and audits, and reports the results.
-pub(super) fn trained(options: &Options, with: Resources, console: &Console) -> Result<(), Error> {
+pub(super) fn trained(options: &TrainOptions, with: Resources, console: &Console) -> Result<(), Error> {
     choice::say_simulated([&options.archive], console);
     let finished = in_session(console, with.clone(), |session| train::train(options, session))?;
-    let Finished { validated, .. } = &finished;
+    let TrainOutcome { validated, .. } = &finished;
     summary::training(console, &finished, &options.out);
     let Some(validated) = validated else {
         let text = "stopped while validating; the run is saved".to_string();
@@ -161,7 +172,7 @@ pub(super) fn trained(options: &Options, with: Resources, console: &Console) -> 
         summary::validation(console, validated);
     }
     let archive = options.out.join(RUN_JSON);
-    let options = audit::Options {
+    let options = audit::AuditOptions {
         robots: Selection::All,
         seed: 1,
         criteria: Criteria::load(None, &[])?,

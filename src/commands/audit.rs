@@ -11,7 +11,7 @@ use crate::body::Body;
 use crate::config::Config;
 use crate::config::audit::Criteria;
 use crate::data::dataset::Split;
-use crate::images::training::Training;
+use crate::images::training::TrainingImages;
 use crate::images::whereabouts::{Whereabouts, load_dataset_of, see};
 use crate::robots;
 use crate::robots::published;
@@ -27,7 +27,7 @@ use crate::store::unwritten::Unwritten;
 use crate::task::evaluation::fresh_rollouts;
 use crate::task::fitness::Fitness;
 use crate::task::grouping::Grouping;
-use crate::task::perturbation::{Perturbation, Setting};
+use crate::task::perturbation::{Perturbation, PerturbedSetting};
 use crate::task::protocol::RolloutMode;
 use crate::task::rollout::walk;
 use rayon::prelude::*;
@@ -43,7 +43,7 @@ const IMAGES_PER_CLASS: usize = 16;
 
 /// Options of an audit.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub struct AuditOptions {
     /// The run.json.
     pub archive: PathBuf,
     /// The robots to audit.
@@ -60,7 +60,7 @@ pub struct Options {
 
 /// Result of an audit.
 #[derive(Clone, Debug)]
-pub struct Finished {
+pub struct AuditOutcome {
     /// The content of audit.json.
     pub file: AuditFile,
     /// Ids of the requested robots.
@@ -88,7 +88,7 @@ struct Subject {
 struct Trial {
     config: Config,
     grouping: Grouping,
-    training: Training,
+    training: TrainingImages,
     criteria: Criteria,
 }
 
@@ -98,7 +98,7 @@ struct Trial {
 ///
 /// # Errors
 /// Returns an error if the archive, data, selection or criteria are wrong.
-pub fn audit(options: &Options, session: &Session) -> Result<Finished, Error> {
+pub fn audit(options: &AuditOptions, session: &Session) -> Result<AuditOutcome, Error> {
     let Opened { config, fitness, training, subjects, order, mut file } = open(options, session)?;
     let grouping = config.grouping()?.with_fitness(fitness);
     let trial = Trial { grouping, training, criteria: options.criteria.clone(), config };
@@ -157,20 +157,20 @@ pub fn audit(options: &Options, session: &Session) -> Result<Finished, Error> {
             unwritten.tried(file.write(&options.out), session)?;
         }
         if stopped {
-            return Ok(Finished { file, asked, known, shipped, stopped, unwritten: unwritten.error() });
+            return Ok(AuditOutcome { file, asked, known, shipped, stopped, unwritten: unwritten.error() });
         }
     }
     if ranks.leads() {
         unwritten.tried(file.write(&options.out), session)?;
     }
-    Ok(Finished { file, asked, known, shipped, stopped: false, unwritten: unwritten.error() })
+    Ok(AuditOutcome { file, asked, known, shipped, stopped: false, unwritten: unwritten.error() })
 }
 
 /// The inputs of an audit.
 struct Opened {
     config: Config,
     fitness: Fitness,
-    training: Training,
+    training: TrainingImages,
     subjects: Vec<Subject>,
     /// Ids of all robots of the run, in order.
     order: Vec<String>,
@@ -178,7 +178,7 @@ struct Opened {
     file: AuditFile,
 }
 
-fn open(options: &Options, session: &Session) -> Result<Opened, Error> {
+fn open(options: &AuditOptions, session: &Session) -> Result<Opened, Error> {
     let path = &options.archive;
     let source = robots::open(path)?;
     source.has_task()?;
@@ -210,7 +210,7 @@ fn open(options: &Options, session: &Session) -> Result<Opened, Error> {
 
 /// Returns the first images per class that a run's robots were evolved on. With other data,
 /// verdicts would mean nothing.
-fn training_of(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Training, Error> {
+fn training_of(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<TrainingImages, Error> {
     let dataset = load_dataset_of(Some(&run.dataset), &run.config, whereabouts, &[Split::Train])?;
     let mut taken = [0; 256];
     let mut images = run.training_images.clone();
@@ -226,7 +226,7 @@ fn training_of(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<
     let (dataset, stimuli) = (run.dataset.clone(), images.iter().map(see).collect::<Result<Vec<_>, Error>>());
     // As in a test, all rollouts have the same conditions, however the robot was trained.
     let conditions = Vec::new();
-    Ok(Training { dataset, images, stimuli: stimuli?, conditions })
+    Ok(TrainingImages { dataset, images, stimuli: stimuli?, conditions })
 }
 
 impl Trial {
@@ -239,7 +239,7 @@ impl Trial {
         let count = |rollouts: usize| {
             session.observer.progress(done.fetch_add(rollouts as u64, Ordering::Relaxed) + rollouts as u64);
         };
-        let setting = Setting {
+        let setting = PerturbedSetting {
             body: subject.body.clone(),
             physics: self.config.physics.clone(),
             protocol: self.config.protocol.clone(),
@@ -303,8 +303,8 @@ impl Trial {
 }
 
 /// Returns the displacements in a setting, or `None` if a rollout is unstable.
-fn displacements_in(setting: &Setting, session: &Session) -> Result<Option<Vec<f64>>, Stopped> {
-    let Setting { body, physics, protocol, stimuli } = setting;
+fn displacements_in(setting: &PerturbedSetting, session: &Session) -> Result<Option<Vec<f64>>, Stopped> {
+    let PerturbedSetting { body, physics, protocol, stimuli } = setting;
     if protocol.rollout == RolloutMode::Fresh {
         let (found, _) = fresh_rollouts(body, stimuli, &[], (physics, protocol), &|_| (), session)?;
         return Ok(found.into_iter().map(Result::ok).collect());
@@ -337,7 +337,7 @@ mod tests {
         let stimuli = [0.0, 1.0].map(|pixel| Grid::filled(height, width, pixel)).to_vec();
         Trial {
             grouping: config.grouping().unwrap(),
-            training: Training { dataset, images, stimuli, conditions: Vec::new() },
+            training: TrainingImages { dataset, images, stimuli, conditions: Vec::new() },
             criteria,
             config,
         }
@@ -394,13 +394,13 @@ mod tests {
         let stimuli =
             vec![image(0.0, 0.0), image(1.0, 0.0), image(0.0, 1.0), image(1.0, 1.0), image(0.0, 0.5)];
         let Trial { config, .. } = trial(4, 6, Physics::default());
-        let setting = Setting { body, physics: config.physics, protocol: config.protocol, stimuli };
+        let setting = PerturbedSetting { body, physics: config.physics, protocol: config.protocol, stimuli };
         let displacements = displacements_in(&setting, &Session::default()).unwrap().unwrap();
         let system = Arc::new(System::new(&setting.body, setting.physics.clone()));
         let (all, _) = walk(&system, &setting.protocol, &setting.stimuli, true, &NEVER).unwrap();
         assert_eq!(displacements, all);
         assert_ne!(all[0], all[1], "it sees something");
-        let sequential = Setting {
+        let sequential = PerturbedSetting {
             protocol: Protocol { rollout: RolloutMode::Sequential, ..setting.protocol.clone() },
             ..setting
         };

@@ -10,7 +10,7 @@ use crate::base::remedy::{Invocation, Remedy};
 use crate::base::session::Session;
 use crate::base::statistics::standard_deviation;
 use crate::base::text::counted;
-use crate::baseline::{Kind, Pooling, Trained, curve};
+use crate::baseline::{NetworkKind, Pooling, Trained, curve};
 use crate::commands::capacity::images::{Images, Task};
 use crate::config::capacity::CapacityConfig;
 use crate::store::audit::AuditFile;
@@ -21,7 +21,7 @@ use crate::store::images::HeldOut;
 use crate::store::names::{CAPACITY_JSON, RUN_JSON};
 use crate::store::results::{replaced, write_with_table};
 use crate::store::run::RunFile;
-use crate::store::setting::{RunRef, Setting};
+use crate::store::setting::{RunRef, RunSetting};
 use crate::store::trainings::Trainings;
 use crate::store::unwritten::Unwritten;
 use crate::task::fitness::Group;
@@ -35,7 +35,7 @@ pub const FIGURES: [&str; 2] = ["svg", "png"];
 
 /// Options of the comparison with networks.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub struct CapacityOptions {
     /// The eval.json.
     pub eval: PathBuf,
     /// Settings of the networks and their training.
@@ -48,7 +48,7 @@ pub struct Options {
 
 /// Result of the comparison.
 #[derive(Clone, Debug)]
-pub struct Finished {
+pub struct CapacityOutcome {
     /// The content of capacity.json.
     pub file: CapacityFile,
     /// The error if results or trainings could not be written, or only in part.
@@ -59,7 +59,7 @@ pub struct Finished {
 ///
 /// # Errors
 /// Returns an error if the evaluation, data or settings are wrong.
-pub fn capacity(options: &Options, session: &Session) -> Result<Finished, Error> {
+pub fn capacity(options: &CapacityOptions, session: &Session) -> Result<CapacityOutcome, Error> {
     let report = EvalFile::read(&options.eval)?;
     let setting = comparable(&report, options, session)?;
     let config = &options.config;
@@ -73,10 +73,10 @@ pub fn capacity(options: &Options, session: &Session) -> Result<Finished, Error>
     let robots = robots(&report, options)?;
     let images = Images::of(&report, setting, (&options.eval, config), session)?;
     let grouping = setting.task.grouping()?;
-    let of_split = |split: &grouping::Split| -> Vec<&RobotReport> {
+    let of_split = |split: &grouping::ClassSplit| -> Vec<&RobotReport> {
         robots.iter().copied().filter(|robot| split.is_called(&robot.task)).collect()
     };
-    let splits: Vec<&grouping::Split> =
+    let splits: Vec<&grouping::ClassSplit> =
         grouping.tasks().iter().filter(|split| !of_split(split).is_empty()).collect();
     let known = Trainings::read(&options.out)?;
     let mut networks = Networks {
@@ -123,11 +123,15 @@ pub fn capacity(options: &Options, session: &Session) -> Result<Finished, Error>
     if file.stopped && !file.tasks.is_empty() {
         unwritten.tried(write(options, &file), session)?;
     }
-    Ok(Finished { file, unwritten: unwritten.error().or(networks.unkept.error()) })
+    Ok(CapacityOutcome { file, unwritten: unwritten.error().or(networks.unkept.error()) })
 }
 
 /// Returns the setting of an evaluation, or an error if no networks can be compared with it.
-fn comparable<'a>(report: &'a EvalFile, options: &Options, session: &Session) -> Result<&'a Setting, Error> {
+fn comparable<'a>(
+    report: &'a EvalFile,
+    options: &CapacityOptions,
+    session: &Session,
+) -> Result<&'a RunSetting, Error> {
     let name = options.eval.display();
     let Some(setting) = &report.setting else {
         let text = format!("{name}: expected \"setting\": an earlier version wrote it");
@@ -167,11 +171,11 @@ fn comparable<'a>(report: &'a EvalFile, options: &Options, session: &Session) ->
 }
 
 /// Refuses kernels that leave nothing of the images to pool.
-fn kernel_fits(config: &CapacityConfig, setting: &Setting) -> Result<(), Error> {
+fn kernel_fits(config: &CapacityConfig, setting: &RunSetting) -> Result<(), Error> {
     let side = setting.body.height.min(setting.body.width);
     let (kernel, pooling) = (config.cnn.kernel, config.cnn.pooling);
     let most = if pooling == Pooling::Max2 { side.saturating_sub(1) } else { side };
-    if kernel > most && config.networks.contains(&Kind::Cnn) {
+    if kernel > most && config.networks.contains(&NetworkKind::Cnn) {
         let of = format!("with images of {side} pixels and pooling {pooling:?}").to_lowercase();
         return Err(Error::input(format!("capacity: cnn.kernel = {kernel}: expected up to {most}, {of}")));
     }
@@ -179,7 +183,7 @@ fn kernel_fits(config: &CapacityConfig, setting: &Setting) -> Result<(), Error> 
 }
 
 /// Hashes all that the trainings of a kind of network depend on; `images` names their images.
-fn key(split: &grouping::Split, kind: Kind, config: &CapacityConfig, images: &str) -> String {
+fn key(split: &grouping::ClassSplit, kind: NetworkKind, config: &CapacityConfig, images: &str) -> String {
     let groups = [Group::A, Group::B].map(|group| split.classes(group));
     // Other arithmetic gives other trainings, so those of networks in f32 must not match.
     let by = concat!(env!("CARGO_PKG_VERSION"), " in f64");
@@ -202,14 +206,14 @@ struct Networks<'a> {
 }
 
 impl Networks<'_> {
-    fn key(&self, split: &grouping::Split, kind: Kind) -> String {
+    fn key(&self, split: &grouping::ClassSplit, kind: NetworkKind) -> String {
         key(split, kind, self.config, &self.images.key)
     }
 
     /// Reports how many networks there are to train, and how many are known.
-    fn begin(&self, splits: &[&grouping::Split]) {
+    fn begin(&self, splits: &[&grouping::ClassSplit]) {
         let Networks { config, known, .. } = self;
-        let of_one = |(split, kind): (&grouping::Split, Kind)| -> usize {
+        let of_one = |(split, kind): (&grouping::ClassSplit, NetworkKind)| -> usize {
             let key = self.key(split, kind);
             config.sizes().map(|size| known.of(&key, size).len().min(config.trainings)).sum()
         };
@@ -224,7 +228,7 @@ impl Networks<'_> {
     }
 
     /// Returns the curves of a task whose robots have this accuracy, or `None` if stopped.
-    fn curves(&mut self, split: &grouping::Split, accuracy: f64) -> Result<Option<Vec<Curve>>, Error> {
+    fn curves(&mut self, split: &grouping::ClassSplit, accuracy: f64) -> Result<Option<Vec<Curve>>, Error> {
         let config = self.config;
         let mut curves = Vec::new();
         for &kind in &config.networks {
@@ -280,7 +284,7 @@ fn point(size: usize, trained: &[(f64, usize)]) -> Point {
     Point { size, mean, standard_deviation: standard_deviation(&accuracies), parameters }
 }
 
-fn curve_of(kind: Kind, points: Vec<Point>, accuracy: f64) -> Curve {
+fn curve_of(kind: NetworkKind, points: Vec<Point>, accuracy: f64) -> Curve {
     let means: Vec<(f64, f64)> = points.iter().map(|point| (point.size as f64, point.mean)).collect();
     let fit = curve::parabola(&means);
     let within = means.first().zip(means.last()).map(|(first, last)| (first.0, last.0));
@@ -292,13 +296,13 @@ fn curve_of(kind: Kind, points: Vec<Point>, accuracy: f64) -> Curve {
     Curve { network: kind.name().to_string(), points, fit, capacity }
 }
 
-fn write(options: &Options, file: &CapacityFile) -> Result<(), Error> {
+fn write(options: &CapacityOptions, file: &CapacityFile) -> Result<(), Error> {
     let figures = FIGURES.map(|ending| options.out.with_extension(ending));
     write_with_table(&options.out, &file.to_json(), &file.to_csv(), figures)
 }
 
 /// Returns the robots that count, all or the physical ones.
-fn robots<'a>(report: &'a EvalFile, options: &Options) -> Result<Vec<&'a RobotReport>, Error> {
+fn robots<'a>(report: &'a EvalFile, options: &CapacityOptions) -> Result<Vec<&'a RobotReport>, Error> {
     let name = options.eval.display();
     if report.robots.is_empty() {
         return Err(Error::input(format!("{name}: there is no robot in it")));
@@ -343,18 +347,18 @@ mod tests {
     #[test]
     fn trainings_are_known_again_by_all_that_they_depend_on() {
         let config = CapacityConfig::default();
-        let of = |groups: [&[u8]; 2], kind: Kind, config: &CapacityConfig, images: &str| {
+        let of = |groups: [&[u8]; 2], kind: NetworkKind, config: &CapacityConfig, images: &str| {
             let grouping = Grouping::two_groups(groups[0], groups[1]).unwrap();
             key(&grouping.tasks()[0], kind, config, images)
         };
         let other_seed = CapacityConfig { seed: config.seed + 1, ..config.clone() };
         let keys = [
-            of([&[1], &[26]], Kind::Mlp, &config, "a"),
+            of([&[1], &[26]], NetworkKind::Mlp, &config, "a"),
             // A class of two digits is not two classes of one digit.
-            of([&[1], &[2, 6]], Kind::Mlp, &config, "a"),
-            of([&[1], &[26]], Kind::Cnn, &config, "a"),
-            of([&[1], &[26]], Kind::Mlp, &config, "b"),
-            of([&[1], &[26]], Kind::Mlp, &other_seed, "a"),
+            of([&[1], &[2, 6]], NetworkKind::Mlp, &config, "a"),
+            of([&[1], &[26]], NetworkKind::Cnn, &config, "a"),
+            of([&[1], &[26]], NetworkKind::Mlp, &config, "b"),
+            of([&[1], &[26]], NetworkKind::Mlp, &other_seed, "a"),
         ];
         let different: std::collections::BTreeSet<&String> = keys.iter().collect();
         assert_eq!(different.len(), keys.len());

@@ -1,13 +1,13 @@
 //! Collects the results of a sweep's tasks in one table.
 
 use crate::analysis::progress::Progress;
-use crate::analysis::sweep::{Collected, Row, RunRow, Tested};
+use crate::analysis::sweep::{Collected, RunRow, SweepRow, Tested};
 use crate::base::error::Error;
 use crate::commands::eval;
 use crate::commands::eval::own_name;
 use crate::commands::tasks::steps::test_of;
 use crate::commands::tasks::task::another;
-use crate::commands::tasks::{Place, Status, Task};
+use crate::commands::tasks::{Task, TaskFolders, TaskStatus};
 use crate::store::audit::AuditFile;
 use crate::store::eval::EvalFile;
 use crate::store::images::HeldOut;
@@ -24,8 +24,8 @@ use std::path::PathBuf;
 /// Returns an error if a run is broken.
 pub fn collect(
     tasks: &[Task],
-    status: &[Status],
-    place: &Place,
+    status: &[TaskStatus],
+    place: &TaskFolders,
     warn: &dyn Fn(&str),
 ) -> Result<Collected, Error> {
     let mut all = Collected { rows: Vec::new(), progress: Vec::new(), archives: Vec::new() };
@@ -34,7 +34,7 @@ pub fn collect(
     for (task, status) in tasks.iter().zip(status) {
         let folder = place.out.join(&task.name);
         let archive = folder.join(RUN_JSON);
-        let row = |run: Option<RunRow>| Row {
+        let row = |run: Option<RunRow>| SweepRow {
             number: status.task,
             name: task.name.clone(),
             state: status.state,
@@ -84,7 +84,7 @@ struct Found {
 
 impl Found {
     /// Reads the results that match the plan; without a plan for tests, any test.
-    fn of(task: &Task, source: &StoredRun, place: &Place, warn: &dyn Fn(&str)) -> Result<Self, Error> {
+    fn of(task: &Task, source: &StoredRun, place: &TaskFolders, warn: &dyn Fn(&str)) -> Result<Self, Error> {
         let run = &source.run;
         let left_out = |text: &str| warn(&format!("{text}; left out"));
         let told = |error: Error| left_out(&error.to_string());
@@ -156,7 +156,7 @@ impl Found {
 fn is_planned_test(
     found: &EvalFile,
     source: &StoredRun,
-    test: &eval::Options,
+    test: &eval::EvalOptions,
     left_out: &dyn Fn(&str),
 ) -> bool {
     let path = test.out.display();

@@ -2,13 +2,13 @@
 
 use crate::data::catalogue::{Catalogue, known_as};
 use crate::data::dataset::{Dataset, DatasetError, Split};
-use crate::data::files::Place;
+use crate::data::files::DatasetPlace;
 use crate::data::info::DatasetInfo;
 use std::collections::BTreeMap;
 
 /// Description of a dataset (`morphcog data info`).
 #[derive(Debug)]
-pub struct Found {
+pub struct FoundDataset {
     /// Name, folder and usable splits.
     pub info: DatasetInfo,
     /// Names of its files that are identical to the published ones.
@@ -23,7 +23,11 @@ pub struct Found {
 ///
 /// # Errors
 /// Returns the error of the training images if neither split can be loaded.
-pub fn info(name: &str, given: &[Place], transpose: Option<bool>) -> Result<Found, DatasetError> {
+pub fn info(
+    name: &str,
+    given: &[DatasetPlace],
+    transpose: Option<bool>,
+) -> Result<FoundDataset, DatasetError> {
     let mut info: Option<DatasetInfo> = None;
     let mut problems = Vec::new();
     for split in Split::ALL {
@@ -47,7 +51,7 @@ pub fn info(name: &str, given: &[Place], transpose: Option<bool>) -> Result<Foun
         .iter()
         .filter_map(|(&split, found)| Some((split, known_as(&found.fingerprint, &found.files)?)));
     let others = known.filter(|(_, known)| *known != name).collect();
-    Ok(Found { info, published, others, problems })
+    Ok(FoundDataset { info, published, others, problems })
 }
 
 #[cfg(test)]

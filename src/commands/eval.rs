@@ -35,7 +35,7 @@ use std::path::PathBuf;
 
 /// Options of an evaluation.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub struct EvalOptions {
     /// The run.json files, which may differ in seeds and windows only; none: the published robots.
     pub archives: Vec<PathBuf>,
     /// The robots to evaluate.
@@ -58,7 +58,7 @@ pub struct Options {
     pub out: PathBuf,
 }
 
-impl Options {
+impl EvalOptions {
     fn draw(&self) -> Draw {
         let choosing = self.robots.validated().map(|_| self.validation);
         Draw { images: self.images, split: self.split, seed: self.seed, choosing }
@@ -67,7 +67,7 @@ impl Options {
 
 /// Result of an evaluation.
 #[derive(Clone, Debug)]
-pub struct Finished {
+pub struct EvalOutcome {
     /// The content of eval.json.
     pub file: EvalFile,
     /// The error if the results could not be written, or only in part.
@@ -79,7 +79,7 @@ pub struct Finished {
 ///
 /// # Errors
 /// Returns an error if the archive, data or selection is wrong.
-pub fn eval(options: &Options, session: &Session) -> Result<Finished, Error> {
+pub fn eval(options: &EvalOptions, session: &Session) -> Result<EvalOutcome, Error> {
     let opened = Opened::new(options, session)?;
     let Opened { sources, config, grouping, wanted, dataset, steps, .. } = &opened;
     if let Some(name) = opened.other {
@@ -107,7 +107,7 @@ pub fn eval(options: &Options, session: &Session) -> Result<Finished, Error> {
             let all_know = session.ranks.all(best.is_some());
             let Some(best) = best.filter(|_| all_know) else {
                 report.stopped = true;
-                return Ok(Finished { file: report, unwritten: None });
+                return Ok(EvalOutcome { file: report, unwritten: None });
             };
             best.into_iter().unzip()
         }
@@ -122,12 +122,12 @@ pub fn eval(options: &Options, session: &Session) -> Result<Finished, Error> {
     session.observer.begins(&Work::new(label, (own_share * images) as u64, "rollouts"));
     let testing = Testing { session, options, sources, grouping, shown: &shown };
     let unwritten = testing.test(&robots, scores, &walker()?, &mut report)?;
-    Ok(Finished { file: report, unwritten: unwritten.error() })
+    Ok(EvalOutcome { file: report, unwritten: unwritten.error() })
 }
 
 /// Returns the results in the file if they are of this very test: same program version, runs,
 /// robots, images, conditions and threshold. Fails as [`eval`] does.
-pub(crate) fn known(options: &Options, session: &Session) -> Result<Option<EvalFile>, Error> {
+pub(crate) fn known(options: &EvalOptions, session: &Session) -> Result<Option<EvalFile>, Error> {
     let Ok(known) = EvalFile::read(&options.out) else { return Ok(None) };
     let opened = Opened::new(options, session)?;
     let shown = HeldOutImages::draw(&opened.config, &opened.sources, &opened.dataset, options.draw())?;
@@ -155,7 +155,7 @@ pub(crate) fn settings(file: &EvalFile) -> [(&'static str, String); 8] {
 /// far as known without images. `cycle_steps` are the control steps per actuation cycle.
 pub(crate) fn differing(
     known: &EvalFile,
-    options: &Options,
+    options: &EvalOptions,
     cycle_steps: u32,
 ) -> Vec<(&'static str, String, String)> {
     let images = match options.images {
@@ -184,7 +184,7 @@ pub(crate) fn differing(
 pub(crate) fn is_of_robots(
     known: &EvalFile,
     sources: &[StoredRun],
-    options: &Options,
+    options: &EvalOptions,
 ) -> Result<bool, Error> {
     let of_run = |run: usize| known.robots.iter().filter(move |robot| robot.run == run);
     if options.robots.validated().is_some() {
@@ -244,7 +244,7 @@ struct Opened<'o> {
 }
 
 impl<'o> Opened<'o> {
-    fn new(options: &'o Options, session: &Session) -> Result<Self, Error> {
+    fn new(options: &'o EvalOptions, session: &Session) -> Result<Self, Error> {
         let threshold = options.threshold;
         if !(0.0..=MOST).contains(&threshold) {
             return Err(Error::argument("threshold", threshold, "expected 0 or more voxel lengths"));
@@ -276,7 +276,7 @@ impl<'o> Opened<'o> {
     }
 
     /// Returns the report as it is before the first robot.
-    fn report(&self, options: &Options, shown: &HeldOutImages) -> EvalFile {
+    fn report(&self, options: &EvalOptions, shown: &HeldOutImages) -> EvalFile {
         let Opened { sources, config, other, dataset, steps, .. } = self;
         let asked = (options.robots.describe(), options.split, options.seed, options.threshold);
         let test_sha256 = dataset.fingerprint(Split::Test);
@@ -304,7 +304,7 @@ fn own(
 /// The parts of a test that all robots share.
 struct Testing<'a> {
     session: &'a Session<'a>,
-    options: &'a Options,
+    options: &'a EvalOptions,
     sources: &'a [StoredRun],
     grouping: &'a Grouping,
     shown: &'a HeldOutImages<'a>,
@@ -364,7 +364,7 @@ impl Testing<'_> {
 }
 
 /// Reads the runs; checks that they can be tested together and the results written.
-fn sources(options: &Options) -> Result<Vec<StoredRun>, Error> {
+fn sources(options: &EvalOptions) -> Result<Vec<StoredRun>, Error> {
     let sources: Vec<StoredRun> =
         options.archives.iter().map(|path| robots::open(path)).collect::<Result<_, _>>()?;
     for source in &sources {
@@ -378,7 +378,7 @@ fn sources(options: &Options) -> Result<Vec<StoredRun>, Error> {
 }
 
 /// Returns how to choose robots by validation images, if requested; the same threshold applies.
-fn wanted(options: &Options, config: &Config) -> Result<Option<validation::Wanted>, Error> {
+fn wanted(options: &EvalOptions, config: &Config) -> Result<Option<validation::Wanted>, Error> {
     let Some(count) = options.robots.validated() else {
         return match options.validation {
             None => Ok(None),
@@ -449,13 +449,13 @@ fn same_setting(first: &StoredRun, other: &StoredRun) -> Result<(), Error> {
 }
 
 /// Sets results of another test aside, if the file has any.
-fn make_room(options: &Options, report: &EvalFile, session: &Session) -> Result<(), Error> {
+fn make_room(options: &EvalOptions, report: &EvalFile, session: &Session) -> Result<(), Error> {
     let validated = |file: &EvalFile| file.robots.first()?.validation.as_ref().map(|of| of.images);
     let is_same = |known: EvalFile| known.head() == report.head() && validated(&known) == validated(report);
     results::make_room(&options.out, || EvalFile::read(&options.out).is_ok_and(is_same), session)
 }
 
-fn write(options: &Options, report: &EvalFile) -> Result<(), Error> {
+fn write(options: &EvalOptions, report: &EvalFile) -> Result<(), Error> {
     write_with_table(&options.out, &report.to_json(), &report.to_csv(), [])
 }
 

@@ -7,7 +7,7 @@ use crate::base::stop::Stopped;
 use crate::config::Config;
 use crate::data::dataset::Split;
 use crate::images::held_out;
-use crate::images::training::Training;
+use crate::images::training::TrainingImages;
 use crate::images::whereabouts;
 use crate::images::whereabouts::Whereabouts;
 use crate::qd::Variation;
@@ -22,7 +22,7 @@ use std::path::PathBuf;
 
 /// The config of a run, and its output folder.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub struct EvolveOptions {
     /// Everything that the result depends on.
     pub config: Config,
     /// Name of the run.
@@ -35,7 +35,7 @@ pub struct Options {
 
 /// The result of a session.
 #[derive(Clone, Debug)]
-pub struct Finished {
+pub struct EvolveOutcome {
     /// The run as written to `run.json`.
     pub run: RunFile,
     /// Counts of the whole run.
@@ -52,7 +52,7 @@ pub struct Finished {
     pub unwritten: Option<Error>,
 }
 
-impl Finished {
+impl EvolveOutcome {
     /// Returns the id of the best robot on validation images or, without validation, the fittest.
     pub fn best(&self) -> Option<&str> {
         let better = |a: &Validated, b: &Validated| a.balanced_accuracy > b.balanced_accuracy;
@@ -67,7 +67,7 @@ impl Finished {
 ///
 /// # Errors
 /// Returns an error if config, data or folder is unsuitable. No existing results are lost.
-pub fn evolve(options: &Options, session: &Session) -> Result<Finished, Error> {
+pub fn evolve(options: &EvolveOptions, session: &Session) -> Result<EvolveOutcome, Error> {
     let config = &options.config;
     let resumes = options.if_exists == IfExists::Resume;
     // Check everything that can be known before anything is written.
@@ -81,7 +81,7 @@ pub fn evolve(options: &Options, session: &Session) -> Result<Finished, Error> {
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;
     whereabouts::say_transposed(&dataset, &config.data, session);
     let size = dataset.size(Split::Train).expect("its training images were loaded just now");
-    let training = Training::of(config, &dataset)?;
+    let training = TrainingImages::of(config, &dataset)?;
     held_out::check(config, &[], "data.images_per_class", &dataset)?;
     let mutations =
         Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome, session };
@@ -118,7 +118,7 @@ pub fn evolve(options: &Options, session: &Session) -> Result<Finished, Error> {
     let (file, totals) = (run.file(), run.totals());
     let is_whole = run.generation >= config.generations;
     let Some(mut files) = files else {
-        return Ok(Finished {
+        return Ok(EvolveOutcome {
             run: file,
             totals,
             size,
@@ -139,7 +139,7 @@ pub fn evolve(options: &Options, session: &Session) -> Result<Finished, Error> {
     };
     let stopped = !is_whole || validated.is_none();
     let validated = validated.unwrap_or_default();
-    Ok(Finished { run: file, totals, size, validated, stopped, unwritten })
+    Ok(EvolveOutcome { run: file, totals, size, validated, stopped, unwritten })
 }
 
 /// Opens the run's metrics.csv to continue after a generation.

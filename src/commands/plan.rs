@@ -1,4 +1,4 @@
-//! [`Plan`]: the experiments and settings of a reproduction of the paper.
+//! [`PaperPlan`]: the experiments and settings of a reproduction of the paper.
 
 use crate::base::error::Error;
 use crate::base::files::read_given;
@@ -17,7 +17,7 @@ pub const PAPER_TOML: (&str, &str) = ("paper.toml", include_str!("../../configs/
 /// Plan of a reproduction: its experiments, and how their robots are tested.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Plan {
+pub struct PaperPlan {
     /// Seeds of each experiment's runs.
     pub seeds: Vec<u64>,
     /// Number of robots tested per task.
@@ -51,7 +51,7 @@ pub struct Experiment {
 /// Fewest test images and trainings at small scales.
 const LEAST: [usize; 2] = [100, 5];
 
-impl Plan {
+impl PaperPlan {
     /// Returns true if a name means the built-in plan, and no file.
     pub fn is_built_in(name: &str) -> bool {
         let own = PAPER_TOML.0;
@@ -69,15 +69,15 @@ impl Plan {
     /// Returns an error with file, line and key if the plan is wrong.
     pub fn load(name: &str, overrides: &[String]) -> Result<Self, Error> {
         let text = match read_given(Path::new(name)) {
-            Err(_) if Plan::is_built_in(name) => PAPER_TOML.1.to_string(),
+            Err(_) if PaperPlan::is_built_in(name) => PAPER_TOML.1.to_string(),
             Err(error) => return Err(Error::reading(Path::new(name), &error)),
             Ok(text) => text,
         };
         let format = reading::Format::of(Path::new(name));
-        let plan: Plan = reading::read(&text, format, name)?;
+        let plan: PaperPlan = reading::read(&text, format, name)?;
         let folder = Path::new(name).parent().unwrap_or(Path::new(""));
-        let placed = |plan: &Plan| Plan { folder: folder.to_path_buf(), ..plan.clone() };
-        let check = |plan: &Plan| plan.check().and_then(|()| placed(plan).experiments().map(|_| ()));
+        let placed = |plan: &PaperPlan| PaperPlan { folder: folder.to_path_buf(), ..plan.clone() };
+        let check = |plan: &PaperPlan| plan.check().and_then(|()| placed(plan).experiments().map(|_| ()));
         let plan =
             reading::changed(plan, overrides, check, |error| reading::placed(error, &text, format, name))?;
         Ok(placed(&plan))
@@ -138,7 +138,7 @@ impl Plan {
             ((count as f64 * scale.sqrt()).round() as usize).max(least).min(count.max(least))
         };
         let trainings = part(self.capacity.trainings, LEAST[1].min(self.capacity.trainings));
-        Plan {
+        PaperPlan {
             images: part(self.images, LEAST[0].min(self.images)),
             capacity: CapacityConfig { trainings, ..self.capacity.clone() },
             ..self.clone()
@@ -158,10 +158,10 @@ mod tests {
 
     #[test]
     fn a_small_scale_has_fewer_images_and_trainings_but_never_too_few() {
-        let plan = Plan::load(PAPER_TOML.0, &[]).unwrap();
+        let plan = PaperPlan::load(PAPER_TOML.0, &[]).unwrap();
         let sizes = |scale: f64| (plan.at(scale).images, plan.at(scale).capacity.trainings);
         assert_eq!([1.0, 0.25, 0.01, 1e-6].map(sizes), [(1000, 50), (500, 25), (100, 5), (100, 5)]);
-        let few = Plan { images: 30, ..plan };
+        let few = PaperPlan { images: 30, ..plan };
         assert_eq!(few.at(0.01).images, 30);
     }
 }

@@ -5,7 +5,7 @@ use crate::base::error::Error;
 use crate::base::remedy::{Invocation, Remedy};
 use crate::base::session::Session;
 use crate::commands::replay;
-use crate::commands::replay::{Found, Options};
+use crate::commands::replay::{FoundRobot, ReplayOptions};
 use crate::draw::error::write_whole;
 use crate::draw::plot;
 use crate::draw::plot::{Background, Figure, PRINT};
@@ -24,7 +24,7 @@ use std::str::FromStr;
 
 /// The subject of a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum FigureKind {
     /// The voxels of a robot.
     Body,
     /// The position of a robot over time.
@@ -41,50 +41,50 @@ pub enum Kind {
     Capacity,
 }
 
-impl Kind {
+impl FigureKind {
     /// All kinds with their names.
-    pub const ALL: [(Kind, &str); 7] = [
-        (Kind::Body, "body"),
-        (Kind::Spacetime, "spacetime"),
-        (Kind::Snapshots, "snapshots"),
-        (Kind::Archive, "archive"),
-        (Kind::Progress, "progress"),
-        (Kind::Accuracy, "accuracy"),
-        (Kind::Capacity, "capacity"),
+    pub const ALL: [(FigureKind, &str); 7] = [
+        (FigureKind::Body, "body"),
+        (FigureKind::Spacetime, "spacetime"),
+        (FigureKind::Snapshots, "snapshots"),
+        (FigureKind::Archive, "archive"),
+        (FigureKind::Progress, "progress"),
+        (FigureKind::Accuracy, "accuracy"),
+        (FigureKind::Capacity, "capacity"),
     ];
 
     /// Returns true if the figure shows one robot.
     pub fn is_of_robot(self) -> bool {
-        matches!(self, Kind::Body | Kind::Spacetime | Kind::Snapshots)
+        matches!(self, FigureKind::Body | FigureKind::Spacetime | FigureKind::Snapshots)
     }
 }
 
-impl fmt::Display for Kind {
+impl fmt::Display for FigureKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        Kind::ALL.iter().filter(|(kind, _)| kind == self).try_for_each(|(_, name)| f.write_str(name))
+        FigureKind::ALL.iter().filter(|(kind, _)| kind == self).try_for_each(|(_, name)| f.write_str(name))
     }
 }
 
-impl FromStr for Kind {
+impl FromStr for FigureKind {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
-        let found = Kind::ALL.iter().find(|(_, name)| *name == text);
-        let names = || Kind::ALL.map(|(_, name)| name).join(", ");
+        let found = FigureKind::ALL.iter().find(|(_, name)| *name == text);
+        let names = || FigureKind::ALL.map(|(_, name)| name).join(", ");
         found.map(|(kind, _)| *kind).ok_or_else(|| format!("expected one of {}", names()))
     }
 }
 
 /// The figures to make, and their files.
 #[derive(Clone, Debug)]
-pub struct Wanted {
+pub struct PlotOptions {
     /// The subject.
-    pub kind: Kind,
+    pub kind: FigureKind,
     /// The run.json files; if empty, the newest under `runs/`.
     pub archives: Vec<PathBuf>,
     /// The robots, for kinds that show a robot.
     pub robots: Vec<Named>,
     /// The options that find robots and images; its own robot and archive are ignored.
-    pub options: Options,
+    pub options: ReplayOptions,
     /// The control steps between poses; 0 chooses them from the walk.
     pub every: usize,
     /// The file; `None` writes SVG and PNG beside the run.json.
@@ -97,7 +97,7 @@ pub struct Wanted {
 
 /// The files that were made.
 #[derive(Clone, Debug)]
-pub struct Finished {
+pub struct PlotOutcome {
     /// Their paths.
     pub files: Vec<PathBuf>,
     /// The runs in a figure of progress.
@@ -114,14 +114,14 @@ struct Made {
 ///
 /// # Errors
 /// Returns an error if an input is invalid, or a figure cannot be made or written.
-pub fn plot(wanted: &Wanted, session: &Session) -> Result<Finished, Error> {
+pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Error> {
     let endings = endings(wanted.out.as_deref())?;
     let archives = match wanted.archives.as_slice() {
         [] if !wanted.kind.is_of_robot() => vec![folder::newest_run()?],
         archives => archives.to_vec(),
     };
     let count = match wanted.kind {
-        Kind::Progress => 1,
+        FigureKind::Progress => 1,
         kind if kind.is_of_robot() => wanted.robots.len(),
         _ => archives.len(),
     };
@@ -156,7 +156,7 @@ pub fn plot(wanted: &Wanted, session: &Session) -> Result<Finished, Error> {
         }
         Ok(())
     };
-    if wanted.kind == Kind::Progress {
+    if wanted.kind == FigureKind::Progress {
         let paths: Vec<&Path> = archives.iter().map(PathBuf::as_path).collect();
         let runs: Vec<RunFile> = paths.iter().map(|path| RunFile::read(path)).collect::<Result<_, _>>()?;
         let named = || paths.iter().copied().zip(&runs);
@@ -182,7 +182,7 @@ pub fn plot(wanted: &Wanted, session: &Session) -> Result<Finished, Error> {
             write(of_robot(wanted, robot)?)?;
         }
     } else {
-        if wanted.kind == Kind::Archive {
+        if wanted.kind == FigureKind::Archive {
             let runs: Vec<RunFile> =
                 archives.iter().map(|path| RunFile::read(path)).collect::<Result<_, _>>()?;
             different(archives.iter().map(PathBuf::as_path).zip(&runs))?;
@@ -197,7 +197,7 @@ pub fn plot(wanted: &Wanted, session: &Session) -> Result<Finished, Error> {
         }
         all.into_iter().try_for_each(write)?;
     }
-    Ok(Finished { files, progress })
+    Ok(PlotOutcome { files, progress })
 }
 
 /// Encodes a figure as PNG; notes if its resolution is lower than usual.
@@ -252,8 +252,8 @@ fn with_ending(stem: &Path, ending: &str) -> PathBuf {
 }
 
 /// Returns the error for a robot named with a kind of figure that shows none.
-pub fn no_robot(kind: Kind) -> Error {
-    let of_robots = Kind::ALL.iter().filter(|(kind, _)| kind.is_of_robot()).map(|(_, name)| *name);
+pub fn no_robot(kind: FigureKind) -> Error {
+    let of_robots = FigureKind::ALL.iter().filter(|(kind, _)| kind.is_of_robot()).map(|(_, name)| *name);
     let of_robots = of_robots.collect::<Vec<_>>().join(", ");
     let text = format!("plot {kind} shows no single robot; expected with {of_robots} only");
     Error::usage(text).about("robot")
@@ -271,7 +271,7 @@ fn too_short(path: &Path, run: &RunFile, generations: usize) -> Error {
 }
 
 /// `plot-<kind>[-robot]` beside a run.json.
-fn stem(archive: &Path, kind: Kind, robot: &str) -> PathBuf {
+fn stem(archive: &Path, kind: FigureKind, robot: &str) -> PathBuf {
     let name = if robot.is_empty() { format!("plot-{kind}") } else { format!("plot-{kind}-{robot}") };
     // Published robots have names by which their files are known.
     match archive == published::archive() {
@@ -280,11 +280,11 @@ fn stem(archive: &Path, kind: Kind, robot: &str) -> PathBuf {
     }
 }
 
-fn of_robot(wanted: &Wanted, named: &Named) -> Result<Made, Error> {
+fn of_robot(wanted: &PlotOptions, named: &Named) -> Result<Made, Error> {
     let Named { archive, robot } = named.clone();
-    let options = Options { robot, archive: Some(archive.clone()), ..wanted.options.clone() };
-    let made = |found: &Found, figure| Made { figure, stem: stem(&archive, wanted.kind, &found.name) };
-    if wanted.kind == Kind::Body {
+    let options = ReplayOptions { robot, archive: Some(archive.clone()), ..wanted.options.clone() };
+    let made = |found: &FoundRobot, figure| Made { figure, stem: stem(&archive, wanted.kind, &found.name) };
+    if wanted.kind == FigureKind::Body {
         let found = replay::find(&options)?;
         return Ok(made(&found, plot::body(&found.body, &found.title())));
     }
@@ -292,20 +292,20 @@ fn of_robot(wanted: &Wanted, named: &Named) -> Result<Made, Error> {
     let title = subject.found.title();
     let recording = replay::record_subject(&subject);
     let figure = match wanted.kind {
-        Kind::Snapshots => plot::snapshots(&recording, wanted.every, &title),
+        FigureKind::Snapshots => plot::snapshots(&recording, wanted.every, &title),
         _ => plot::spacetime(&recording, &title),
     }?;
     Ok(made(&subject.found, figure))
 }
 
-fn of_run(kind: Kind, path: &Path) -> Result<Figure, Error> {
-    let maker = if kind == Kind::Accuracy { "eval" } else { "capacity" };
+fn of_run(kind: FigureKind, path: &Path) -> Result<Figure, Error> {
+    let maker = if kind == FigureKind::Accuracy { "eval" } else { "capacity" };
     let with_maker = |error: Error| match error.remedies.is_empty() {
         true => error.remedy(Remedy::Run(Invocation::new(maker), "makes it")),
         false => error,
     };
     match kind {
-        Kind::Accuracy => {
+        FigureKind::Accuracy => {
             let beside = result(path, EVAL_JSON);
             let report = match beside == *path {
                 true => EvalFile::read(path),
@@ -318,7 +318,7 @@ fn of_run(kind: Kind, path: &Path) -> Result<Figure, Error> {
             }
             Ok(plot::accuracy(&report))
         }
-        Kind::Capacity => {
+        FigureKind::Capacity => {
             let (beside, eval) = (result(path, CAPACITY_JSON), folder::beside(path, EVAL_JSON));
             let file = CapacityFile::read(&beside).map_err(with_maker)?;
             if beside != *path {
@@ -349,8 +349,8 @@ fn result(path: &Path, name: &str) -> PathBuf {
 }
 
 /// Returns the part of a figure's name that comes from a directly named result file.
-fn result_name(kind: Kind, path: &Path) -> String {
-    let is_result = matches!(kind, Kind::Accuracy | Kind::Capacity);
+fn result_name(kind: FigureKind, path: &Path) -> String {
+    let is_result = matches!(kind, FigureKind::Accuracy | FigureKind::Capacity);
     let stem =
         path.file_stem().filter(|_| is_result && path.file_name().is_some_and(|name| name != RUN_JSON));
     stem.map_or(String::new(), |stem| stem.to_string_lossy().into_owned())
@@ -362,10 +362,10 @@ mod tests {
 
     #[test]
     fn kinds_are_named_and_endings_say_the_format() {
-        for (kind, name) in Kind::ALL {
-            assert_eq!((name.parse::<Kind>(), kind.to_string()), (Ok(kind), name.to_string()));
+        for (kind, name) in FigureKind::ALL {
+            assert_eq!((name.parse::<FigureKind>(), kind.to_string()), (Ok(kind), name.to_string()));
         }
-        assert!("pie".parse::<Kind>().unwrap_err().contains("spacetime"));
+        assert!("pie".parse::<FigureKind>().unwrap_err().contains("spacetime"));
         assert_eq!(endings(Some(Path::new("a.SVG"))).unwrap(), ["svg"]);
         assert_eq!(endings(Some(Path::new("a"))).unwrap(), ["svg", "png"]);
         assert_eq!(endings(Some(Path::new("a.pdf"))).unwrap_err().kind.exit_code(), 2);

@@ -6,7 +6,7 @@ use crate::base::remedy::{Invocation, Remedy};
 use crate::body::Body;
 use crate::config::{Config, DataConfig};
 use crate::data::dataset::Split;
-use crate::images::training::Training;
+use crate::images::training::TrainingImages;
 use crate::images::whereabouts::{Whereabouts, load_dataset_of, see};
 use crate::robots;
 use crate::robots::published;
@@ -14,7 +14,7 @@ use crate::robots::selection::Selection;
 use crate::store::images::{DatasetRef, ImageRef};
 use crate::task::answer::Readout;
 use crate::task::protocol::RolloutMode;
-use crate::task::recording::{Recording, Seen};
+use crate::task::recording::{LabelledStimulus, Recording};
 use crate::task::rollout::record;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -24,14 +24,14 @@ pub const MAX_IMAGES: usize = 20;
 
 /// An image by split and index: `train:3`, `test:17`; without a word, a training image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shown {
+pub struct ShownImage {
     /// Its split.
     pub split: Split,
     /// Its index there.
     pub index: usize,
 }
 
-impl FromStr for Shown {
+impl FromStr for ShownImage {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
         let (split, digits) = match text.split_once(':') {
@@ -42,13 +42,13 @@ impl FromStr for Shown {
         };
         let index =
             digits.trim().parse().map_err(|_| format!("{text}: expected an index, as 3 or test:17"))?;
-        Ok(Shown { split, index })
+        Ok(ShownImage { split, index })
     }
 }
 
 /// Options of a recording.
 #[derive(Clone, Debug, Default)]
-pub struct Options {
+pub struct ReplayOptions {
     /// The robot: an id or its beginning, "best", or a name in the gallery.
     pub robot: String,
     /// True if only robots count that an audit found physical.
@@ -56,7 +56,7 @@ pub struct Options {
     /// The run.json; `None`: the newest under `runs/`.
     pub archive: Option<PathBuf>,
     /// The images; none: the training images.
-    pub images: Vec<Shown>,
+    pub images: Vec<ShownImage>,
     /// Folder of the data, if the command line names one.
     pub data: Option<PathBuf>,
     /// Another dataset than the run's.
@@ -76,21 +76,21 @@ pub struct Replay {
 
 /// A robot and its images, before the simulation.
 #[derive(Clone, Debug)]
-pub struct Subject {
+pub struct ReplaySubject {
     /// The robot.
-    pub found: Found,
+    pub found: FoundRobot,
     /// Images as it sees them.
-    pub images: Vec<Seen>,
+    pub images: Vec<LabelledStimulus>,
 }
 
 /// Records a robot's rollout under the protocol of its config.
 ///
 /// # Errors
 /// Returns an error if the robot, archive, images or data are wrong.
-pub fn replay(options: &Options) -> Result<Replay, Error> {
+pub fn replay(options: &ReplayOptions) -> Result<Replay, Error> {
     let subject = subject(options)?;
     let recording = record_subject(&subject);
-    let Found { name, config, mut about, .. } = subject.found;
+    let FoundRobot { name, config, mut about, .. } = subject.found;
     let fresh = config.protocol.rollout == RolloutMode::Fresh;
     about.push((
         "Images".to_string(),
@@ -105,8 +105,8 @@ pub fn replay(options: &Options) -> Result<Replay, Error> {
 }
 
 /// Records a subject's rollout.
-pub fn record_subject(subject: &Subject) -> Recording {
-    let Subject { found: Found { name, body, config, judge, .. }, images } = subject;
+pub fn record_subject(subject: &ReplaySubject) -> Recording {
+    let ReplaySubject { found: FoundRobot { name, body, config, judge, .. }, images } = subject;
     let fresh = config.protocol.rollout == RolloutMode::Fresh;
     let recording = record(name, body, &config.physics, &config.protocol, fresh, images);
     Recording { judge: judge.clone(), ..recording }
@@ -116,7 +116,7 @@ pub fn record_subject(subject: &Subject) -> Recording {
 ///
 /// # Errors
 /// Returns an error if the robot, archive, images or data are wrong.
-pub fn subject(options: &Options) -> Result<Subject, Error> {
+pub fn subject(options: &ReplayOptions) -> Result<ReplaySubject, Error> {
     let mut found = find(options)?;
     let config = &mut found.config;
     if let Some(dataset) = &options.dataset {
@@ -138,11 +138,11 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
                 let is_shown = |per_class: &usize| per_class * config.classes().len() <= MAX_IMAGES;
                 let images_per_class = Some(config.data.images_per_class).filter(is_shown).unwrap_or(1);
                 let data = DataConfig { images_per_class, ..config.data.clone() };
-                Training::of(&Config { data, ..config.clone() }, &train)?.images
+                TrainingImages::of(&Config { data, ..config.clone() }, &train)?.images
             }
             own => own.to_vec(),
         };
-        let training = |image: &ImageRef| Shown { split: Split::Train, index: image.index };
+        let training = |image: &ImageRef| ShownImage { split: Split::Train, index: image.index };
         shown = some(&all).iter().map(training).collect();
     }
     if shown.len() > MAX_IMAGES {
@@ -154,18 +154,18 @@ pub fn subject(options: &Options) -> Result<Subject, Error> {
     let own = found.dataset.as_ref().filter(|own| own.name == config.data.dataset);
     let dataset = load_dataset_of(own, config, &whereabouts, &wanted).map_err(offer)?;
     let mut images = Vec::new();
-    for Shown { split, index } in shown {
+    for ShownImage { split, index } in shown {
         let label = dataset.label(split, index).map_err(|error| match (&options.archive, asks) {
             (_, true) => Error::usage(error.to_string()).about("images"),
             (Some(path), _) => Error::input(format!("{}: training_images: {error}", path.display())),
             (None, _) => Error::input(format!("training_images: {error}")),
         })?;
         let stimulus = see(config, &dataset, split, index)?;
-        images.push(Seen { class: label, label: format!("{label} ({split} {index})"), stimulus });
+        images.push(LabelledStimulus { class: label, label: format!("{label} ({split} {index})"), stimulus });
     }
     config.data.dataset = dataset.name().to_string();
     check_length(config, images.len())?;
-    Ok(Subject { found, images })
+    Ok(ReplaySubject { found, images })
 }
 
 /// Training images to show: all, or the first of each class if they are too many.
@@ -180,7 +180,7 @@ fn some(images: &[ImageRef]) -> Vec<ImageRef> {
 
 /// A robot, and the settings of its simulation.
 #[derive(Clone, Debug)]
-pub struct Found {
+pub struct FoundRobot {
     /// Its id.
     pub name: String,
     /// Its body.
@@ -199,7 +199,7 @@ pub struct Found {
     pub archive: PathBuf,
 }
 
-impl Found {
+impl FoundRobot {
     /// Returns the title of its picture, one line: robot, run and seed.
     pub fn title(&self) -> String {
         let word = |key: &str| self.about.iter().find(|(word, _)| word == key).map_or("", |(_, value)| value);
@@ -211,7 +211,7 @@ impl Found {
 ///
 /// # Errors
 /// Returns an error if the robot or archive is wrong.
-pub fn find(options: &Options) -> Result<Found, Error> {
+pub fn find(options: &ReplayOptions) -> Result<FoundRobot, Error> {
     let ids = Selection::Ids(vec![options.robot.clone()]);
     let (archives, _) = robots::archives(options.archive.iter().cloned().collect(), ids)?;
     let [archive] = archives.try_into().expect("one is named, or else there is one");
@@ -235,7 +235,7 @@ pub fn find(options: &Options) -> Result<Found, Error> {
         ("Born".to_string(), format!("generation {}", robot.generation)),
     ];
     let (name, body) = (robot.id.clone(), robot.body.clone());
-    Ok(Found {
+    Ok(FoundRobot {
         name,
         body,
         training: run.training_images.clone(),

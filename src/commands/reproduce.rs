@@ -4,12 +4,12 @@ use crate::base::error::Error;
 use crate::base::random::{Purpose, stream};
 use crate::base::session::Session;
 use crate::base::text::counted;
-use crate::commands::plan::Plan;
-use crate::commands::table::Row;
+use crate::commands::plan::PaperPlan;
+use crate::commands::table::TableRow;
 use crate::commands::tasks::all::check_test;
 use crate::commands::tasks::steps::written;
 use crate::commands::tasks::task::another;
-use crate::commands::tasks::{self, Place, Run, Steps, Summary, Task};
+use crate::commands::tasks::{self, Run, Steps, Task, TaskFolders, TasksSummary};
 use crate::commands::{audit, capacity, eval, plan, table};
 use crate::config::Config;
 use crate::data::dataset::Split;
@@ -29,24 +29,24 @@ use std::sync::atomic::Ordering;
 
 /// Options of a reproduction.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub struct ReproduceOptions {
     /// The plan.
-    pub plan: Plan,
+    pub plan: PaperPlan,
     /// Its scale, above 0 and up to 1.
     pub scale: f64,
-    /// Place of the results.
-    pub place: Place,
+    /// Folders of the results.
+    pub place: TaskFolders,
     /// Runs at once; `None`: one per core.
     pub jobs: Option<usize>,
 }
 
 /// Result of a reproduction.
 #[derive(Clone, Debug)]
-pub struct Finished {
+pub struct ReproduceOutcome {
     /// Summary of the runs; the table is made when all are done.
-    pub runs: Summary,
+    pub runs: TasksSummary,
     /// The paper's table so far.
-    pub rows: Vec<Row>,
+    pub rows: Vec<TableRow>,
     /// Files written at the end.
     pub files: Vec<PathBuf>,
     /// Networks of every experiment, with their file.
@@ -61,7 +61,7 @@ pub struct Finished {
 ///
 /// # Errors
 /// Returns an error if the scale or plan is wrong.
-pub fn tasks(plan: &Plan, scale: f64) -> Result<Vec<Task>, Error> {
+pub fn tasks(plan: &PaperPlan, scale: f64) -> Result<Vec<Task>, Error> {
     if !(scale > 0.0 && scale <= 1.0) {
         return Err(Error::argument("scale", scale, "expected more than 0, up to 1"));
     }
@@ -87,7 +87,7 @@ pub fn tasks(plan: &Plan, scale: f64) -> Result<Vec<Task>, Error> {
 ///
 /// # Errors
 /// Returns an error if a check, or a step after the runs, fails.
-pub fn reproduce(options: &Options, session: &Session) -> Result<Finished, Error> {
+pub fn reproduce(options: &ReproduceOptions, session: &Session) -> Result<ReproduceOutcome, Error> {
     let tasks = tasks(&options.plan, options.scale)?;
     let place = &options.place;
     tasks::check_folders(&tasks, place).map_err(|mut refused| refused.swap_remove(0))?;
@@ -100,7 +100,8 @@ pub fn reproduce(options: &Options, session: &Session) -> Result<Finished, Error
     let runs = tasks::run_all(&tasks, place, options.jobs, session)?;
     let (rows, capacities) = (Vec::new(), Vec::new());
     let stopped = runs.done < tasks.len();
-    let mut finished = Finished { runs, rows, files: Vec::new(), capacities, stopped, unwritten: None };
+    let mut finished =
+        ReproduceOutcome { runs, rows, files: Vec::new(), capacities, stopped, unwritten: None };
     if stopped {
         return Ok(finished);
     }
@@ -114,7 +115,7 @@ pub fn reproduce(options: &Options, session: &Session) -> Result<Finished, Error
     let job = Job { place, plan: &plan, session };
     for (name, config) in &experiments {
         let Some((found, networks)) = job.experiment(name, config)? else {
-            return Ok(Finished { stopped: true, ..finished });
+            return Ok(ReproduceOutcome { stopped: true, ..finished });
         };
         finished.rows.extend(found);
         finished.capacities.extend(networks);
@@ -130,11 +131,11 @@ pub fn reproduce(options: &Options, session: &Session) -> Result<Finished, Error
 type Drawn<'s> = (Vec<Chosen<'s>>, BTreeMap<String, (usize, usize)>);
 
 /// Rows of the table, and networks with their file.
-type Experienced = (Vec<Row>, Option<(PathBuf, CapacityFile)>);
+type Experienced = (Vec<TableRow>, Option<(PathBuf, CapacityFile)>);
 
 struct Job<'a> {
-    place: &'a Place,
-    plan: &'a Plan,
+    place: &'a TaskFolders,
+    plan: &'a PaperPlan,
     session: &'a Session<'a>,
 }
 
@@ -150,7 +151,8 @@ impl Job<'_> {
             .iter()
             .filter(|task| grouping.tasks().iter().any(|s| s.name() == **task && !s.is_same_way()))
             .collect();
-        let mut rows: Vec<Row> = tasks.iter().map(|task| Row::new(&config.data.dataset, task)).collect();
+        let mut rows: Vec<TableRow> =
+            tasks.iter().map(|task| TableRow::new(&config.data.dataset, task)).collect();
         for row in &mut rows {
             (row.physical, row.audited) = audited.get(&row.task).copied().unwrap_or((0, 0));
         }
@@ -163,7 +165,7 @@ impl Job<'_> {
         let path = self.place.out.join(format!("{name}-eval.json"));
         let Some(report) = self.tested(name, &path, &sources, &chosen)? else { return Ok(None) };
         self.session.observer.note(&format!("{name}: networks"));
-        let options = capacity::Options {
+        let options = capacity::CapacityOptions {
             eval: path.clone(),
             config: self.plan.capacity.clone(),
             physical_only: false,
@@ -232,7 +234,7 @@ impl Job<'_> {
             if ids.is_empty() {
                 continue;
             }
-            let options = audit::Options {
+            let options = audit::AuditOptions {
                 archive: source.path.clone(),
                 robots: Selection::Ids(ids),
                 seed: 0,
@@ -264,7 +266,7 @@ impl Job<'_> {
             "{} elites of each task, drawn at random, physical ones first, none that exploits the simulator",
             self.plan.robots
         );
-        let options = eval::Options {
+        let options = eval::EvalOptions {
             archives: sources.iter().map(|source| source.path.clone()).collect(),
             robots: Selection::Drawn { robots: ids, about },
             images: HowMany::Evenly(self.plan.images),

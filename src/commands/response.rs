@@ -18,15 +18,15 @@ use crate::response::gait::Gait;
 use crate::response::lesson::Example;
 use crate::response::probing;
 use crate::response::probing::Probing;
-use crate::response::regression::{Response, Shown};
+use crate::response::regression::{RandomRollout, Response};
 use crate::robots;
 use crate::robots::selection::Selection;
 use crate::store::folder::{check_out, writable};
 use crate::store::images::{DatasetRef, ImageRef};
 use crate::store::names::RESPONSE_JSON;
 use crate::store::response::{
-    EndedBy, FORMAT, FORMAT_VERSION, PICTURES, ResponseFile, RobotResponse, Setting, Taught, Unfinished,
-    pictures,
+    EndedBy, FORMAT, FORMAT_VERSION, PICTURES, ResponseFile, ResponseSetting, RobotResponse,
+    TrainingEstimate, Unfinished, pictures,
 };
 use crate::store::results::replaced;
 use crate::store::unwritten::Unwritten;
@@ -53,7 +53,7 @@ const LEAST_PER_CLASS: usize = 4;
 
 /// Options of a measurement.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub struct ResponseOptions {
     /// The run.json.
     pub archive: PathBuf,
     /// Names of the robots to measure.
@@ -76,7 +76,7 @@ pub struct Options {
 
 /// Result of a measurement.
 #[derive(Clone, Debug)]
-pub struct Finished {
+pub struct ResponseOutcome {
     /// The content of response.json.
     pub file: ResponseFile,
     /// Pictures of its robots, still to be drawn.
@@ -107,7 +107,7 @@ struct Provenance {
 ///
 /// # Errors
 /// Returns an error if the archive, robots, data or options are wrong.
-pub fn measure(options: &Options, session: &Session) -> Result<Finished, Error> {
+pub fn measure(options: &ResponseOptions, session: &Session) -> Result<ResponseOutcome, Error> {
     check_numbers(options)?;
     let provenance = provenance(options)?;
     let config = &provenance.config;
@@ -214,11 +214,11 @@ pub fn measure(options: &Options, session: &Session) -> Result<Finished, Error> 
     refused.iter().for_each(|error| session.observer.warning(&format!("{error}; left out")));
     let ids: Vec<&str> = file.robots.iter().map(|robot| robot.id.as_str()).collect();
     let pictures = pictures(&options.out, &ids);
-    Ok(Finished { pictures, file, stopped, unwritten: unwritten.error() })
+    Ok(ResponseOutcome { pictures, file, stopped, unwritten: unwritten.error() })
 }
 
-fn check_numbers(options: &Options) -> Result<(), Error> {
-    let Options { images, error, seed, .. } = options;
+fn check_numbers(options: &ResponseOptions) -> Result<(), Error> {
+    let ResponseOptions { images, error, seed, .. } = options;
     if !(BATCH..=MOST_RANDOM_IMAGES).contains(images) {
         let text = format!("expected {BATCH} to {MOST_RANDOM_IMAGES} random images");
         return Err(Error::argument("images", images, text).advice("with fewer, no slope is known"));
@@ -233,7 +233,7 @@ fn check_numbers(options: &Options) -> Result<(), Error> {
 }
 
 /// Checks that results and pictures can be written, and overwrite nothing of a run.
-fn check_names(options: &Options, subjects: &[Subject]) -> Result<(), Error> {
+fn check_names(options: &ResponseOptions, subjects: &[Subject]) -> Result<(), Error> {
     let out = &options.out;
     check_out(out, &options.archive, RESPONSE_JSON)?;
     if PICTURES.iter().any(|ending| out.with_extension(ending) == *out) {
@@ -245,7 +245,7 @@ fn check_names(options: &Options, subjects: &[Subject]) -> Result<(), Error> {
 }
 
 /// Returns the requested robots, each once, and their run.
-fn provenance(options: &Options) -> Result<Provenance, Error> {
+fn provenance(options: &ResponseOptions) -> Result<Provenance, Error> {
     let path = &options.archive;
     let source = robots::open(path)?;
     let chosen = Selection::Ids(options.robots.clone()).physical(options.physical_only);
@@ -280,7 +280,7 @@ struct Task {
 
 /// Reads the requested task.
 fn task(
-    options: &Options,
+    options: &ResponseOptions,
     provenance: &Provenance,
     seed: u64,
     session: &Session,
@@ -335,13 +335,13 @@ fn reference(dataset: &Dataset) -> DatasetRef {
 }
 
 fn setting(
-    options: &Options,
+    options: &ResponseOptions,
     seed: u64,
     config: &Config,
     probing: &Probing,
     task: Option<&Task>,
-) -> Result<Setting, Error> {
-    Ok(Setting {
+) -> Result<ResponseSetting, Error> {
+    Ok(ResponseSetting {
         seed,
         images: options.images,
         error: options.error,
@@ -364,9 +364,9 @@ impl Task {
         &self,
         gait: &Gait,
         response: &Response,
-        shown: &[Shown],
+        shown: &[RandomRollout],
         session: &Session,
-    ) -> Result<Option<Taught>, Error> {
+    ) -> Result<Option<TrainingEstimate>, Error> {
         let config = &self.config;
         let (mut stimulus, mut margin) = (config.stimulus, None);
         if config.train.windows > 0 {
@@ -383,13 +383,13 @@ impl Task {
         };
         let examples = self.images.iter().zip(ways).map(example).collect::<Result<Vec<Example>, Error>>()?;
         let found = teachable(shown, response.scatter, &examples, answer::THRESHOLD, config.seed, session)?;
-        Ok(found.map(|teachable| Taught { margin, ..teachable.into() }))
+        Ok(found.map(|teachable| TrainingEstimate { margin, ..teachable.into() }))
     }
 }
 
 /// The parts of a measurement that all robots share.
 struct Measuring<'a> {
-    options: &'a Options,
+    options: &'a ResponseOptions,
     config: &'a Config,
     probing: Probing,
     task: Option<Task>,
@@ -402,7 +402,7 @@ struct Measuring<'a> {
 
 /// Returns earlier results to reuse, from the results' file and from beside the run. Fails if the
 /// results' file cannot be read.
-fn earlier(options: &Options, session: &Session) -> Result<Vec<(PathBuf, ResponseFile)>, Error> {
+fn earlier(options: &ResponseOptions, session: &Session) -> Result<Vec<(PathBuf, ResponseFile)>, Error> {
     let out = replaced(&options.out)?.map(|file| (options.out.clone(), file));
     let beside = Some(options.archive.with_file_name(RESPONSE_JSON)).filter(|beside| *beside != options.out);
     let beside = beside.and_then(|path| ResponseFile::found(&path, session).map(|file| (path, file)));
@@ -433,7 +433,7 @@ impl Measuring<'_> {
     ) -> Result<Option<RobotResponse>, Error> {
         let Measuring { options, config, probing, session, .. } = self;
         let (known, ended) = self.known(gait);
-        let mut shown: Vec<Shown> = Vec::new();
+        let mut shown: Vec<RandomRollout> = Vec::new();
         // The rollouts of a finished measurement cost nothing: they are taken whole, and first. A
         // stopped one is repeated batch by batch, as if it had never been stopped.
         let most = options.images.max(ended);

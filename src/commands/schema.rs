@@ -1,7 +1,7 @@
 //! JSON Schemas of configs and results, made from the types that read them.
 
 use crate::base::error::Error;
-use crate::commands::plan::Plan;
+use crate::commands::plan::PaperPlan;
 use crate::commands::sweep::SweepPlan;
 use crate::config::Config;
 use crate::config::audit::Criteria;
@@ -34,7 +34,7 @@ pub struct Schema {
 pub const ALL: [Schema; 11] = [
     of_config::<Config>("config", "config of evolve and train"),
     of_config::<SweepPlan>("sweep", "plan of sweep"),
-    of_config::<Plan>("plan", "plan of reproduce"),
+    of_config::<PaperPlan>("plan", "plan of reproduce"),
     of_config::<Criteria>("audit-config", "config of audit"),
     of_config::<CapacityConfig>("capacity-config", "config of capacity"),
     of::<RunFile>("run", "run.json", run::FORMAT_VERSION),

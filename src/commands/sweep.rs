@@ -6,7 +6,7 @@ use crate::base::files::{home_expanded, read_given};
 use crate::base::hash::sha256_hex;
 use crate::base::remedy::{Invocation, Remedy};
 use crate::commands::tasks::task::selection;
-use crate::commands::tasks::{AuditStep, EvalStep, Run, Steps, Task, Training};
+use crate::commands::tasks::{AuditStep, EvalStep, Run, Steps, Task, TrainRun};
 use crate::config::{Config, Settings, flatten, reading};
 use crate::shipped;
 use crate::store::folder::{self, one_run};
@@ -310,7 +310,7 @@ impl SweepPlan {
             Base::Train(archive, source) => {
                 let groups = groups.cloned().expect("a plan with an archive has groups");
                 let config = training::config_of(&source.run.config, groups.classes(), Some(seed), &set)?;
-                Run::Train(Box::new(Training {
+                Run::Train(Box::new(TrainRun {
                     archive: archive.clone(),
                     sha256: source.run.fingerprint(),
                     robots: self.robots.clone().unwrap_or("top:4".to_string()),

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// A row of the table: one task.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Row {
+pub struct TableRow {
     /// The task, as "0|1".
     pub task: String,
     /// Number of robots tested.
@@ -43,11 +43,11 @@ pub struct Row {
     pub paper_cnn: Option<f64>,
 }
 
-impl Row {
+impl TableRow {
     /// Returns a row with the paper's values only.
     pub(crate) fn new(dataset: &str, task: &str) -> Self {
         let paper = published::row(dataset, task);
-        Row {
+        TableRow {
             task: task.to_string(),
             robots: 0,
             physical: 0,
@@ -82,7 +82,7 @@ impl Row {
 }
 
 /// Writes `reproduction.json` and `reproduction.csv` into a folder, and returns their paths.
-pub(crate) fn write(folder: &Path, scale: f64, rows: &[Row]) -> Result<Vec<PathBuf>, Error> {
+pub(crate) fn write(folder: &Path, scale: f64, rows: &[TableRow]) -> Result<Vec<PathBuf>, Error> {
     let about = serde_json::json!({
         "format": "morphcog-reproduction", "format_version": 1, "program_version": env!("CARGO_PKG_VERSION"),
         "scale": scale, "rows": rows,

@@ -7,7 +7,7 @@ use crate::base::observer::Work;
 use crate::base::remedy::Remedy;
 use crate::base::session::Session;
 use crate::base::text::counted;
-use crate::baseline::linear::{Labelled, Linear, Moments};
+use crate::baseline::linear::{LabelledPixels, Linear, PixelMoments};
 use crate::baseline::nearest::nearest;
 use crate::commands::eval::images::chosen_by;
 use crate::config::Config;
@@ -37,7 +37,7 @@ use std::path::PathBuf;
 
 /// Options of a team's test.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub struct TeamOptions {
     /// The run.json files.
     pub archives: Vec<PathBuf>,
     /// Their robots. Ids are looked up in all runs together; other selections apply to each run.
@@ -56,7 +56,7 @@ pub struct Options {
 
 /// Result of a team's test.
 #[derive(Clone, Debug)]
-pub struct Finished {
+pub struct TeamOutcome {
     /// The content of team.json.
     pub file: TeamFile,
     /// The error if the results could not be written, or only in part.
@@ -67,7 +67,7 @@ pub struct Finished {
 ///
 /// # Errors
 /// Returns an error if robots do not fit the classes, or archive, data or selection is wrong.
-pub fn team(options: &Options, session: &Session) -> Result<Finished, Error> {
+pub fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutcome, Error> {
     let archives = options.archives.iter();
     let sources = archives.map(|path| StoredRun::read(path)).collect::<Result<Vec<StoredRun>, Error>>()?;
     let Some(first) = sources.first() else {
@@ -92,7 +92,7 @@ pub fn team(options: &Options, session: &Session) -> Result<Finished, Error> {
     said.iter().for_each(|text| session.observer.warning(text));
     let classes = classes(options, &dataset)?;
     let splits = robots.iter().map(|chosen| split_of(&sources[chosen.source], chosen));
-    let splits = splits.collect::<Result<Vec<grouping::Split>, Error>>()?;
+    let splits = splits.collect::<Result<Vec<grouping::ClassSplit>, Error>>()?;
     covered(&robots, &splits, &classes)?;
     let images = match options.split {
         HeldOut::Test => test_images(&classes, &dataset, options.images, options.seed)?,
@@ -149,7 +149,7 @@ pub fn team(options: &Options, session: &Session) -> Result<Finished, Error> {
         let walker = HeldOutRun::new(&run.config, control_steps, done, session)?;
         let Some((displacements, _)) = walker.rollouts(chosen.robot, &stimuli) else {
             file.members = members.into_iter().flatten().collect();
-            return Ok(Finished { file, unwritten: unwritten.error() });
+            return Ok(TeamOutcome { file, unwritten: unwritten.error() });
         };
         done += images.len() as u64;
         let trial =
@@ -162,7 +162,7 @@ pub fn team(options: &Options, session: &Session) -> Result<Finished, Error> {
     file.baselines = pool.install(|| baselines(&file, (&sources, &robots, &splits), &dataset, split))?;
     file.answers = Some(file.decided());
     unwritten.tried(write(options, &file, session), session)?;
-    Ok(Finished { file, unwritten: unwritten.error() })
+    Ok(TeamOutcome { file, unwritten: unwritten.error() })
 }
 
 /// Checks that two runs have robots of the same data.
@@ -177,7 +177,7 @@ fn same_data(first: &StoredRun, other: &StoredRun) -> Result<(), Error> {
 }
 
 /// Returns the robots of the team: ids from all runs together, other selections from each run.
-fn chosen<'a>(options: &Options, sources: &'a [StoredRun]) -> Result<Vec<Chosen<'a>>, Error> {
+fn chosen<'a>(options: &TeamOptions, sources: &'a [StoredRun]) -> Result<Vec<Chosen<'a>>, Error> {
     if options.robots.validated().is_some() {
         let text = "expected another selection: a team does not choose by images";
         return Err(Error::argument("robots", VALIDATED, text)
@@ -196,7 +196,7 @@ fn chosen<'a>(options: &Options, sources: &'a [StoredRun]) -> Result<Vec<Chosen<
 }
 
 /// Returns the classes to tell apart, in order.
-fn classes(options: &Options, dataset: &Dataset) -> Result<Vec<u8>, Error> {
+fn classes(options: &TeamOptions, dataset: &Dataset) -> Result<Vec<u8>, Error> {
     let all = dataset.classes(Split::Train);
     let mut classes = options.classes.clone().unwrap_or_else(|| all.clone());
     classes.sort_unstable();
@@ -223,7 +223,7 @@ pub fn own_name(split: HeldOut) -> &'static str {
 }
 
 /// Returns the two groups that a robot tells apart.
-fn split_of(source: &StoredRun, chosen: &Chosen) -> Result<grouping::Split, Error> {
+fn split_of(source: &StoredRun, chosen: &Chosen) -> Result<grouping::ClassSplit, Error> {
     let grouping = source.run.config.grouping()?;
     let text =
         || format!("{}: robot {} walks the same way for every class", source.path.display(), chosen.robot.id);
@@ -232,14 +232,14 @@ fn split_of(source: &StoredRun, chosen: &Chosen) -> Result<grouping::Split, Erro
 }
 
 /// Checks that every class has a robot, and every robot only classes of the team.
-fn covered(robots: &[Chosen], splits: &[grouping::Split], classes: &[u8]) -> Result<(), Error> {
+fn covered(robots: &[Chosen], splits: &[grouping::ClassSplit], classes: &[u8]) -> Result<(), Error> {
     let is_unknown = |class: &&u8| splits.iter().all(|split| split.group(**class).is_none());
     let missing: Vec<String> = classes.iter().filter(is_unknown).map(u8::to_string).collect();
     if !missing.is_empty() {
         let text = format!("no robot of the team knows class {}", missing.join(", "));
         return Err(Error::input(text).remedy(Remedy::AddRuns).remedy(Remedy::NameClasses));
     }
-    let is_foreign = |split: &grouping::Split| {
+    let is_foreign = |split: &grouping::ClassSplit| {
         [Group::A, Group::B].into_iter().flat_map(|g| split.classes(g)).any(|class| !classes.contains(class))
     };
     match robots.iter().zip(splits).find(|(_, split)| is_foreign(split)) {
@@ -254,7 +254,7 @@ fn covered(robots: &[Chosen], splits: &[grouping::Split], classes: &[u8]) -> Res
 
 /// Draws images of the training split that no run was trained on and no robot was chosen by.
 fn validation_images(
-    options: &Options,
+    options: &TeamOptions,
     sources: &[StoredRun],
     classes: &[u8],
     dataset: &Dataset,
@@ -275,13 +275,13 @@ fn is_same(a: &TeamFile, b: &TeamFile) -> bool {
 
 /// Returns the members of an earlier test on the same images, stopped or with fewer robots. Fails
 /// if its file cannot be read.
-fn known(options: &Options, now: &TeamFile) -> Result<Vec<Member>, Error> {
+fn known(options: &TeamOptions, now: &TeamFile) -> Result<Vec<Member>, Error> {
     let earlier = replaced::<TeamFile>(&options.out)?.filter(|file| is_same(file, now));
     Ok(earlier.map_or(Vec::new(), |file| file.members))
 }
 
 /// Writes the results so far; sets those of another test in the file aside.
-fn write(options: &Options, file: &TeamFile, session: &Session) -> Result<(), Error> {
+fn write(options: &TeamOptions, file: &TeamFile, session: &Session) -> Result<(), Error> {
     let is_same = || TeamFile::read(&options.out).is_ok_and(|known| is_same(&known, file));
     results::make_room(&options.out, is_same, session)?;
     file.write(&options.out)
@@ -291,7 +291,7 @@ fn write(options: &Options, file: &TeamFile, session: &Session) -> Result<(), Er
 /// pair of classes that a robot tells apart, as that robot sees them.
 fn baselines(
     file: &TeamFile,
-    (sources, robots, splits): (&[StoredRun], &[Chosen], &[grouping::Split]),
+    (sources, robots, splits): (&[StoredRun], &[Chosen], &[grouping::ClassSplit]),
     dataset: &Dataset,
     split: Split,
 ) -> Result<Option<TeamBaselines>, Error> {
@@ -315,7 +315,7 @@ fn baselines(
     let known = labelled(&training);
     let stimuli = see_all(&common, dataset, split, &file.images)?;
     let labels = || file.images.iter().map(|image| image.label);
-    let moments = Moments::new(&known);
+    let moments = PixelMoments::new(&known);
     let against_rest = |class: &u8| {
         let rest: Vec<u8> = classes.iter().copied().filter(|other| other != class).collect();
         moments.apart(&[*class], &rest)
@@ -331,7 +331,7 @@ fn baselines(
     let pair = |a: u8, b: u8| {
         // A positive value is a walk to the right.
         let judge = Readout { left: vec![b], right: vec![a] };
-        let is_pair = |split: &grouping::Split| {
+        let is_pair = |split: &grouping::ClassSplit| {
             let mut told = [Group::A, Group::B].map(|group| split.classes(group).to_vec());
             told.sort();
             told == [vec![a], vec![b]]
@@ -344,7 +344,7 @@ fn baselines(
             return Ok((judge, stimuli.iter().map(|stimulus| linear.value(stimulus)).collect()));
         }
         let training = training_of(config, &[a, b])?;
-        let linear = Moments::new(&labelled(&training)).apart(&[a], &[b]);
+        let linear = PixelMoments::new(&labelled(&training)).apart(&[a], &[b]);
         let value = |image: &ImageRef| Ok(linear.value(&see(config, dataset, split, image.index)?));
         Ok((judge, file.images.iter().map(value).collect::<Result<_, Error>>()?))
     };
@@ -368,6 +368,6 @@ fn baselines(
     }))
 }
 
-fn labelled(training: &[(Grid<f64>, u8)]) -> Vec<Labelled<'_>> {
+fn labelled(training: &[(Grid<f64>, u8)]) -> Vec<LabelledPixels<'_>> {
     training.iter().map(|(stimulus, class)| (stimulus, *class)).collect()
 }

@@ -6,7 +6,7 @@ use crate::base::session::Session;
 use crate::base::text::counted;
 use crate::config::Config;
 use crate::data::dataset::Split;
-use crate::images::training::Training;
+use crate::images::training::TrainingImages;
 use crate::images::whereabouts;
 use crate::images::whereabouts::Whereabouts;
 use crate::qd::{Archive, DescriptorSpace, Elite};
@@ -24,7 +24,7 @@ use crate::store::validation::Validated;
 use crate::task::grouping::Groups;
 use crate::training::gaits::{Walker, key, measured, origin, walkers};
 use crate::training::log::Log;
-use crate::training::rounds::Taught;
+use crate::training::rounds::TrainedDesign;
 use crate::training::trainer::Trainer;
 use crate::training::{check_groups, config_of, sized, with_images};
 use std::path::{Path, PathBuf};
@@ -32,7 +32,7 @@ use std::time::Instant;
 
 /// The gaits to train, the task, and the output folder.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub struct TrainOptions {
     /// Path of the run.json with the gaits.
     pub archive: PathBuf,
     /// Robots whose gaits are tried; the one with the best prediction is trained.
@@ -53,7 +53,7 @@ pub struct Options {
 
 /// The result of a training.
 #[derive(Clone, Debug)]
-pub struct Finished {
+pub struct TrainOutcome {
     /// The run as written to `run.json`.
     pub run: RunFile,
     /// Total number of rollouts simulated, without validation.
@@ -69,7 +69,7 @@ pub struct Finished {
 /// # Errors
 /// Returns an error if the archive, an option, the data or the folder is unsuitable, or if it was
 /// stopped ([`IfExists::Resume`] continues it). No existing results are lost.
-pub fn train(options: &Options, session: &Session) -> Result<Finished, Error> {
+pub fn train(options: &TrainOptions, session: &Session) -> Result<TrainOutcome, Error> {
     if options.robots.validated().is_some() {
         let text = "expected another selection: gaits have no task to validate";
         let error = Error::argument("robots", VALIDATED, text);
@@ -87,7 +87,7 @@ pub fn train(options: &Options, session: &Session) -> Result<Finished, Error> {
     let config = sized(config, &of_gaits.dataset, &of_gaits.config, &dataset, &options.set, session);
     let origin = origin(&source, &config, &dataset)?;
     let config = with_images(config, &origin.trained_on, &dataset, session)?;
-    let mut training = Training::of(&config, &dataset)?;
+    let mut training = TrainingImages::of(&config, &dataset)?;
     let classes = training.images.iter().map(|image| image.label);
     training.conditions = config.train.perturbations.of(classes);
     let walkers = walkers(&source, &options.robots, &config.train, config.seed)?;
@@ -131,7 +131,7 @@ pub fn train(options: &Options, session: &Session) -> Result<Finished, Error> {
         _ => validation::at_end(&archive, &dataset, session)?,
     };
     let size = dataset.size(Split::Train).expect("a training loads its training images");
-    Ok(Finished { run, rollouts: log.simulated, size, validated })
+    Ok(TrainOutcome { run, rollouts: log.simulated, size, validated })
 }
 
 /// Checks that the output folder is not that of the gaits, whose run would be overwritten.
@@ -148,12 +148,12 @@ fn apart(out: &Path, archive: &Path) -> Result<(), Error> {
 
 /// Builds the run file of the trained robot.
 fn run_file(
-    options: &Options,
+    options: &TrainOptions,
     config: &Config,
-    training: &Training,
+    training: &TrainingImages,
     origin: Origin,
     walker: &Walker,
-    taught: &Taught,
+    taught: &TrainedDesign,
 ) -> Result<RunFile, Error> {
     let body = taught.body.clone();
     let genome = walker.robot.genome.with_body(&body).map_err(|error| Error::other(error.to_string()))?;

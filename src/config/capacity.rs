@@ -1,7 +1,7 @@
 //! The networks to compare with robots, and their training.
 
 use crate::base::error::Error;
-use crate::baseline::{Hyperparameters, Kind, Pooling};
+use crate::baseline::{Hyperparameters, NetworkKind, Pooling};
 use crate::config::{pair, reading};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -18,7 +18,7 @@ const MOST_TRAININGS: usize = 100_000;
 #[serde(default, deny_unknown_fields)]
 pub struct CapacityConfig {
     /// The kinds of network.
-    pub networks: Vec<Kind>,
+    pub networks: Vec<NetworkKind>,
     /// The smallest and the largest size.
     #[serde(deserialize_with = "pair::read")]
     pub sizes: [usize; 2],
@@ -42,7 +42,7 @@ pub struct CapacityConfig {
 impl Default for CapacityConfig {
     fn default() -> Self {
         CapacityConfig {
-            networks: Kind::ALL.to_vec(),
+            networks: NetworkKind::ALL.to_vec(),
             sizes: [1, 45],
             step: 1,
             trainings: 50,
@@ -103,10 +103,10 @@ impl CapacityConfig {
     }
 
     /// Returns the hyperparameters of a kind of network.
-    pub fn of(&self, kind: Kind) -> &Hyperparameters {
+    pub fn of(&self, kind: NetworkKind) -> &Hyperparameters {
         match kind {
-            Kind::Mlp => &self.mlp,
-            Kind::Cnn => &self.cnn,
+            NetworkKind::Mlp => &self.mlp,
+            NetworkKind::Cnn => &self.cnn,
         }
     }
 

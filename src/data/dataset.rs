@@ -7,7 +7,7 @@ pub use crate::data::builtin::BUILTIN;
 use crate::data::builtin::{BuiltinDigits, BuiltinError};
 use crate::data::catalogue::{FETCHABLE, known_as};
 use crate::data::files;
-use crate::data::files::{FilesError, Place, StoredSplit};
+use crate::data::files::{DatasetPlace, FilesError, StoredSplit};
 pub use crate::data::info::Split;
 use crate::data::info::{DatasetInfo, SplitInfo};
 use std::collections::BTreeMap;
@@ -111,7 +111,7 @@ impl Dataset {
     ///
     /// # Errors
     /// Returns [`DatasetError::Files`]: the file, its place, what was expected and what to do.
-    pub fn load(name: &str, given: &[Place], wanted: &[Split]) -> Result<Self, DatasetError> {
+    pub fn load(name: &str, given: &[DatasetPlace], wanted: &[Split]) -> Result<Self, DatasetError> {
         Dataset::oriented(name, given, wanted, None)
     }
 
@@ -123,7 +123,7 @@ impl Dataset {
     /// As [`Dataset::load`].
     pub fn oriented(
         name: &str,
-        given: &[Place],
+        given: &[DatasetPlace],
         wanted: &[Split],
         transpose: Option<bool>,
     ) -> Result<Self, DatasetError> {

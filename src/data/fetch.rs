@@ -216,7 +216,7 @@ impl From<FetchError> for Error {
 
 /// The origin of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Outcome {
+pub enum FetchOutcome {
     /// It existed already, and was right.
     Kept,
     /// It was downloaded from this address.
@@ -229,7 +229,7 @@ pub struct Fetched {
     /// The file.
     pub file: PathBuf,
     /// Its origin.
-    pub outcome: Outcome,
+    pub outcome: FetchOutcome,
 }
 
 /// Downloads all files of a dataset with the first of these programs that is installed. Each is
@@ -275,10 +275,10 @@ pub fn fetch(
         if let Some(other) = other.filter(is_other) {
             std::fs::remove_file(&other).map_err(|source| disk(&other, source))?;
         }
-        Ok(Fetched { file, outcome: Outcome::Downloaded(url) })
+        Ok(Fetched { file, outcome: FetchOutcome::Downloaded(url) })
     };
     let fetched = catalogue.files.iter().zip(kept).map(|(remote, kept)| match kept {
-        Some(file) => Ok(Fetched { file, outcome: Outcome::Kept }),
+        Some(file) => Ok(Fetched { file, outcome: FetchOutcome::Kept }),
         None => bring(remote),
     });
     let fetched: Result<Vec<Fetched>, FetchError> = fetched.collect();

@@ -22,7 +22,7 @@ pub(crate) fn published_size(name: &str) -> Option<[usize; 2]> {
 
 /// A folder that should hold the data.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct DatasetPlace {
     /// Origin of the folder in the user's terms: "as given", "MORPHCOG_DATA", `[data] dir`.
     pub origin: String,
     /// The folder. If it has a subfolder with the dataset's name, that is used, so one folder can
@@ -30,7 +30,7 @@ pub struct Place {
     pub path: PathBuf,
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for DatasetPlace {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "{} ({})", self.path.display(), self.origin)
     }
@@ -41,7 +41,11 @@ impl fmt::Display for Place {
 ///
 /// Only the first one is used, and must work: silently reading other data than the user named would
 /// be worse than an error.
-pub fn places(option: Option<&Path>, environment: Option<OsString>, config: Option<&Path>) -> Vec<Place> {
+pub fn places(
+    option: Option<&Path>,
+    environment: Option<OsString>,
+    config: Option<&Path>,
+) -> Vec<DatasetPlace> {
     let environment = environment.filter(|value| !value.is_empty()).map(PathBuf::from);
     [
         ("as given", option.map(Path::to_path_buf)),
@@ -49,7 +53,9 @@ pub fn places(option: Option<&Path>, environment: Option<OsString>, config: Opti
         ("[data] dir", config.map(Path::to_path_buf)),
     ]
     .into_iter()
-    .filter_map(|(origin, path)| Some(Place { origin: origin.to_string(), path: home_expanded(&path?) }))
+    .filter_map(|(origin, path)| {
+        Some(DatasetPlace { origin: origin.to_string(), path: home_expanded(&path?) })
+    })
     .collect()
 }
 
@@ -73,7 +79,7 @@ pub enum FilesError {
         /// Name of the dataset.
         dataset: String,
         /// The folder.
-        place: Box<Place>,
+        place: Box<DatasetPlace>,
         /// The system's error.
         source: io::Error,
         /// The user's alternatives.
@@ -94,7 +100,7 @@ pub enum FilesError {
         /// The file's standard name.
         expected: String,
         /// The folder.
-        place: Box<Place>,
+        place: Box<DatasetPlace>,
         /// The user's alternatives.
         remedies: Vec<Remedy>,
     },
@@ -111,7 +117,7 @@ pub enum FilesError {
         /// "images" or "labels".
         content: &'static str,
         /// The folder.
-        place: Box<Place>,
+        place: Box<DatasetPlace>,
         /// The files that match.
         found: Vec<String>,
     },
@@ -179,15 +185,15 @@ pub fn check_name(name: &str) -> Result<(), FilesError> {
 }
 
 /// Chooses the first given place, or else the default; its path is the folder with the files.
-pub(crate) fn choose(name: &str, given: &[Place]) -> Result<Place, FilesError> {
+pub(crate) fn choose(name: &str, given: &[DatasetPlace]) -> Result<DatasetPlace, FilesError> {
     check_name(name)?;
     Ok(match given.first() {
         Some(place) => {
             let own = place.path.join(name);
             let path = if own.is_dir() { own } else { place.path.clone() };
-            Place { origin: place.origin.clone(), path }
+            DatasetPlace { origin: place.origin.clone(), path }
         }
-        None => Place { origin: "default".to_string(), path: default_folder(name) },
+        None => DatasetPlace { origin: "default".to_string(), path: default_folder(name) },
     })
 }
 
@@ -195,7 +201,7 @@ pub(crate) fn choose(name: &str, given: &[Place]) -> Result<Place, FilesError> {
 /// images are exchanged, as in EMNIST's files, which are recognised by their names by default.
 pub(crate) fn load(
     name: &str,
-    place: &Place,
+    place: &DatasetPlace,
     split: Split,
     transpose: Option<bool>,
 ) -> Result<(Vec<u8>, StoredSplit), FilesError> {
@@ -236,7 +242,7 @@ pub(crate) fn load(
 
 /// Returns true if images are EMNIST's, which is published with rows and columns exchanged, by the
 /// names of their dataset, file or folder. (A published dataset may be in a folder of any name.)
-fn is_emnist(dataset: &str, place: &Place, image_file: &Path) -> bool {
+fn is_emnist(dataset: &str, place: &DatasetPlace, image_file: &Path) -> bool {
     let folder = place.path.canonicalize().unwrap_or_else(|_| place.path.clone());
     let folder = folder.file_name().filter(|_| !FETCHABLE.contains(&dataset));
     let names = [Some(dataset.as_ref()), image_file.file_name(), folder];
@@ -263,7 +269,7 @@ fn standard_names(split: Split, content: &str) -> Vec<String> {
 /// and the beginning of the name, up to the content; `beginning` requires one.
 fn find(
     name: &str,
-    place: &Place,
+    place: &DatasetPlace,
     split: Split,
     content: &'static str,
     beginning: Option<&str>,
@@ -315,7 +321,7 @@ fn bare(file: &str) -> String {
 }
 
 /// Returns true if files have the same content after unpacking.
-fn hold_the_same(name: &str, place: &Place, files: &[&String]) -> Result<bool, FilesError> {
+fn hold_the_same(name: &str, place: &DatasetPlace, files: &[&String]) -> Result<bool, FilesError> {
     if files.len() < 2 {
         return Ok(true);
     }
@@ -347,7 +353,7 @@ fn file_names(folder: &Path) -> io::Result<BTreeSet<String>> {
 }
 
 /// Returns remedies for files that are missing or (`replace`) wrong.
-fn remedies(name: &str, place: &Place, replace: bool) -> Vec<Remedy> {
+fn remedies(name: &str, place: &DatasetPlace, replace: bool) -> Vec<Remedy> {
     if !FETCHABLE.contains(&name) {
         let put = Remedy::advice("put its IDX files there");
         return vec![put, Remedy::NameData, Remedy::UseBuiltin];
@@ -378,7 +384,7 @@ mod tests {
         fs::write(folder.join(labels), [idx::header(&[count]), values].concat()).unwrap();
     }
 
-    fn given(folder: &Path) -> Vec<Place> {
+    fn given(folder: &Path) -> Vec<DatasetPlace> {
         places(Some(folder), None, None)
     }
 

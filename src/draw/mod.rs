@@ -36,7 +36,7 @@ pub(crate) fn simulated(
     use crate::body::Body;
     use crate::sim::Physics;
     use crate::task::protocol::Protocol;
-    use crate::task::recording::Seen;
+    use crate::task::recording::LabelledStimulus;
     use crate::task::rollout::record;
     let body: Body = body.parse().expect("tests name bodies");
     let image = |phase: usize| {
@@ -44,9 +44,9 @@ pub(crate) fn simulated(
             |row: usize, column: usize| if (row + column + phase).is_multiple_of(3) { 1.0 } else { 0.0 };
         let stimulus = Grid::from_fn(body.height(), body.width(), pixel);
         let label = format!("{} (train {})", phase % 2, 2 * phase + 1);
-        Seen { class: (phase % 2) as u8, label, stimulus }
+        LabelledStimulus { class: (phase % 2) as u8, label, stimulus }
     };
-    let images: Vec<Seen> = (0..phases).map(image).collect();
+    let images: Vec<LabelledStimulus> = (0..phases).map(image).collect();
     let protocol = Protocol { control_steps: steps, ..Protocol::default() };
     record("ROBOT", &body, &Physics::default(), &protocol, fresh, &images)
 }

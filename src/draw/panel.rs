@@ -8,7 +8,7 @@ use crate::draw::stage::Stage;
 use crate::draw::walk::Walk;
 use crate::draw::{colour, fonts};
 use crate::task::answer;
-use crate::task::recording::Seen;
+use crate::task::recording::LabelledStimulus;
 
 /// The side of the stimulus picture at zoom 1, pixels.
 const STIMULUS: f64 = 84.0;
@@ -65,7 +65,7 @@ pub fn least_width(walk: &Walk) -> f64 {
 
 /// The words about a moment of a walk that every view shows.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Readout {
+pub struct Caption {
     /// The label of the current image.
     pub label: String,
     /// The control steps completed in the phase, their total, and the cycles completed.
@@ -77,7 +77,7 @@ pub struct Readout {
 }
 
 /// Returns the words about a frame.
-pub fn readout(walk: &Walk, frame: usize) -> Readout {
+pub fn readout(walk: &Walk, frame: usize) -> Caption {
     let frames = walk.phase_frames(walk.phase_index(frame));
     // A phase that continues into the next ends with the first frame of that phase.
     let goes_on = frames.end < walk.len() && !walk.is_fresh(walk.phase_index(frame) + 1);
@@ -92,8 +92,8 @@ pub fn readout(walk: &Walk, frame: usize) -> Readout {
     } else {
         '→'
     };
-    let Seen { class, label, .. } = &walk.phase(frame).seen;
-    Readout {
+    let LabelledStimulus { class, label, .. } = &walk.phase(frame).seen;
+    Caption {
         label: label.clone(),
         time: format!("step {step}/{} · cycle {}", last - frames.start, number::fixed(cycles, 1)),
         displacement: format!("{arrow} {}", signed(d)),

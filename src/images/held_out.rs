@@ -7,7 +7,7 @@ use crate::base::text::counted;
 use crate::config::Config;
 use crate::config::validation::{IMAGES_KEY, LEAST, ValidationConfig};
 use crate::data::dataset::{Dataset, Split};
-use crate::images::training::Training;
+use crate::images::training::TrainingImages;
 use crate::store::images::{HowMany, ImageRef};
 use crate::store::run::RunFile;
 use crate::store::training::Origin;
@@ -18,7 +18,7 @@ pub(crate) fn trained_on(run: &RunFile, dataset: &Dataset) -> Result<BTreeSet<us
     let mut seen: BTreeSet<usize> =
         run.origin.iter().flat_map(|origin: &Origin| &origin.trained_on).copied().collect();
     seen.extend(run.training_images.iter().map(|image| image.index));
-    seen.extend(Training::indices(&run.config, dataset)?);
+    seen.extend(TrainingImages::indices(&run.config, dataset)?);
     Ok(seen)
 }
 
@@ -78,7 +78,7 @@ pub(crate) fn check(config: &Config, before: &[usize], key: &str, dataset: &Data
     if best == 0 {
         return Ok(());
     }
-    let mut seen: BTreeSet<usize> = Training::indices(config, dataset)?.into_iter().collect();
+    let mut seen: BTreeSet<usize> = TrainingImages::indices(config, dataset)?.into_iter().collect();
     seen.extend(before);
     let classes = config.classes();
     let left = left(&classes, &seen, dataset);

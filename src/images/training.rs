@@ -1,4 +1,4 @@
-//! [`Training`]: the training images of a run, as its robots see them.
+//! [`TrainingImages`]: the training images of a run, as its robots see them.
 
 use crate::base::Grid;
 use crate::base::error::Error;
@@ -13,7 +13,7 @@ use std::path::Path;
 
 /// The training images of a run and their stimuli.
 #[derive(Clone, Debug)]
-pub struct Training {
+pub struct TrainingImages {
     /// Dataset of the images.
     pub dataset: DatasetRef,
     /// Images, in the order of a sequential rollout.
@@ -43,14 +43,14 @@ pub(crate) fn scarcest(dataset: &Dataset, classes: &[u8], least: usize) -> Resul
     }
 }
 
-impl Training {
+impl TrainingImages {
     /// Loads the training images of a config.
     ///
     /// # Errors
     /// Returns an error if the data are missing or broken, if an image is of a class outside the
     /// task, or if a class has no image.
     pub fn load(config: &Config, data: Option<&Path>) -> Result<Self, Error> {
-        Training::of(config, &load_dataset(config, data, &[Split::Train])?)
+        TrainingImages::of(config, &load_dataset(config, data, &[Split::Train])?)
     }
 
     /// Returns the indices of the training images of a config.
@@ -73,12 +73,12 @@ impl Training {
     /// Returns the training images of a config, at least one of each class of its task.
     ///
     /// # Errors
-    /// As [`Training::load`].
+    /// As [`TrainingImages::load`].
     pub(crate) fn images(config: &Config, dataset: &Dataset) -> Result<Vec<ImageRef>, Error> {
         let refuse = |error: DatasetError| Error::input(format!("data.train_images: {error}"));
         let classes = config.classes();
         let mut images = Vec::new();
-        for index in Training::indices(config, dataset)? {
+        for index in TrainingImages::indices(config, dataset)? {
             let label = dataset.label(Split::Train, index).map_err(refuse)?;
             if !classes.contains(&label) {
                 let text =
@@ -99,15 +99,15 @@ impl Training {
     /// Takes the training images of a config from a loaded dataset.
     ///
     /// # Errors
-    /// As [`Training::load`].
+    /// As [`TrainingImages::load`].
     pub fn of(config: &Config, dataset: &Dataset) -> Result<Self, Error> {
-        let images = Training::images(config, dataset)?;
+        let images = TrainingImages::images(config, dataset)?;
         let seen = |image: &ImageRef| see(config, dataset, Split::Train, image.index);
         let stimuli: Vec<Grid<f64>> = images.iter().map(seen).collect::<Result<_, _>>()?;
         let train_sha256 = dataset.fingerprint(Split::Train).expect("its images were read just now");
         let dataset = DatasetRef { name: dataset.name().to_string(), train_sha256 };
         let (stimuli, conditions) = config.objective().prepare(stimuli, &config.physics, config.seed);
-        Ok(Training { dataset, images, stimuli, conditions })
+        Ok(TrainingImages { dataset, images, stimuli, conditions })
     }
 
     /// Describes the images to the user, one by one if they are few.
@@ -150,7 +150,7 @@ mod tests {
     #[test]
     fn images_are_pairs_of_opposites_where_training_images_differ_and_the_same_for_the_same_seed() {
         let images = |more: &str, seed: &str| {
-            Training::load(&config(more, &[&format!("seed={seed}")]).unwrap(), None).unwrap()
+            TrainingImages::load(&config(more, &[&format!("seed={seed}")]).unwrap(), None).unwrap()
         };
         let (plain, random) = (images("", "1"), images(RESPONSE, "1"));
         assert_eq!(random.images, plain.images);
@@ -184,13 +184,13 @@ mod tests {
     #[test]
     fn every_second_pair_is_shown_from_a_raised_start_without_length_limits() {
         let [ground, raised] = of_response();
-        let training = Training::load(&config(RESPONSE, &[]).unwrap(), None).unwrap();
+        let training = TrainingImages::load(&config(RESPONSE, &[]).unwrap(), None).unwrap();
         assert_eq!(
             training.conditions[..6],
             [&ground, &ground, &raised, &raised, &ground, &ground].map(Clone::clone)
         );
         assert_eq!(training.conditions.len(), 12);
-        let plain = Training::load(&config("", &[]).unwrap(), None).unwrap();
+        let plain = TrainingImages::load(&config("", &[]).unwrap(), None).unwrap();
         assert!(plain.conditions.is_empty());
     }
 

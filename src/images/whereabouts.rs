@@ -8,7 +8,7 @@ use crate::base::session::Session;
 use crate::config::{BodyConfig, Config, DataConfig, reading};
 use crate::data::dataset::{BUILTIN, Dataset, Split};
 use crate::data::files;
-use crate::data::files::{Place, default_folder, places};
+use crate::data::files::{DatasetPlace, default_folder, places};
 use crate::shipped::read_text;
 use crate::store::folder::{IfExists, RunFolder};
 use crate::store::images::{DatasetRef, ImageRef};
@@ -146,7 +146,7 @@ impl Whereabouts {
 
     /// Returns the first remembered folder of a dataset that still exists, and the first that does
     /// not.
-    fn remembered(&self, dataset: &str) -> Result<(Option<Place>, Option<Place>), Error> {
+    fn remembered(&self, dataset: &str) -> Result<(Option<DatasetPlace>, Option<DatasetPlace>), Error> {
         let mut gone = None;
         for path in self.remembered.iter().filter(|path| path.exists()) {
             let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
@@ -157,7 +157,7 @@ impl Whereabouts {
                 continue;
             }
             let folder = path.parent().unwrap_or(Path::new("")).join(home_expanded(&found.folder));
-            let place = Place { origin: name, path: folder };
+            let place = DatasetPlace { origin: name, path: folder };
             match place.path.is_dir() {
                 true => return Ok((Some(place), None)),
                 false => _ = gone.get_or_insert(place),

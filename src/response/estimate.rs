@@ -8,8 +8,8 @@ use crate::base::random::{Purpose, stream};
 use crate::base::session::Session;
 use crate::base::stop::Stopped;
 use crate::body::Material;
-use crate::response::lesson::{Example, Lesson};
-use crate::response::regression::{Response, Shown};
+use crate::response::lesson::{DesignProblem, Example};
+use crate::response::regression::{RandomRollout, Response};
 use crate::task::fitness::ENOUGH;
 use std::f64::consts::{PI, SQRT_2};
 
@@ -48,7 +48,7 @@ impl Estimate {
 
 /// The estimated results of training a gait.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Teachable {
+pub struct Trainability {
     /// Mean clipped margin of its answers: from −1 to 1.
     pub fitness: Estimate,
     /// Fraction of its answers that are correct.
@@ -69,13 +69,13 @@ pub struct Teachable {
 /// # Errors
 /// Returns [`Stopped`] if `stop` was set in the meantime.
 pub fn teachable(
-    shown: &[Shown],
+    shown: &[RandomRollout],
     scatter: f64,
     examples: &[Example],
     threshold: f64,
     seed: u64,
     session: &Session,
-) -> Result<Option<Teachable>, Stopped> {
+) -> Result<Option<Trainability>, Stopped> {
     let Some(halves) = Half::both(shown, examples) else { return Ok(None) };
     let mut estimates = Vec::new();
     for (number, (own, other)) in (0..).zip([(&halves[0], &halves[1]), (&halves[1], &halves[0])]) {
@@ -84,7 +84,7 @@ pub fn teachable(
         estimates.push(other.judged(&design, scatter, threshold));
     }
     let of = |which: usize| Estimate::mean([estimates[0][which], estimates[1][which]]);
-    Ok(Some(Teachable { fitness: of(0), accuracy: of(1) }))
+    Ok(Some(Trainability { fitness: of(0), accuracy: of(1) }))
 }
 
 /// One half of the rollouts and of the examples.
@@ -102,7 +102,7 @@ struct Half<'a> {
 type Solved = (Vec<Material>, f64);
 
 impl<'a> Half<'a> {
-    fn both(shown: &[Shown], examples: &'a [Example]) -> Option<[Self; 2]> {
+    fn both(shown: &[RandomRollout], examples: &'a [Example]) -> Option<[Self; 2]> {
         let mut rollouts = [Vec::new(), Vec::new()];
         let mut seen: Vec<usize> = Vec::new();
         for shown in shown {
@@ -135,7 +135,7 @@ impl<'a> Half<'a> {
         let any = vec![Material::SensorExpand; slopes.len()];
         let solved = |side: f64, draw: u64| {
             let examples = self.examples.iter().map(|example| (*example, *intercept));
-            let mut lesson = Lesson::predicted(examples, slopes, &any, side);
+            let mut lesson = DesignProblem::predicted(examples, slopes, &any, side);
             lesson.solve_from_many(&mut stream(seed, Purpose::Training, 0, 2 * number + draw));
             (lesson.objective(), lesson.design())
         };
@@ -261,7 +261,7 @@ mod tests {
             moved + [2.0, -2.0][condition]
         }
 
-        fn shown(&mut self, count: usize) -> Vec<Shown> {
+        fn shown(&mut self, count: usize) -> Vec<RandomRollout> {
             let rollout = |number: usize| {
                 let widths: Vec<f64> =
                     self.slopes.iter().map(|_| if self.random.unit() < 0.4 { 1.6 } else { 0.6 }).collect();
@@ -270,7 +270,7 @@ mod tests {
             let all: Vec<_> = (0..count).map(rollout).collect();
             let scattered = |(widths, condition): (Vec<f64>, usize)| {
                 let displacement = self.walks(&widths, condition) + self.noise * self.random.normal();
-                Shown { displacement, widths, condition }
+                RandomRollout { displacement, widths, condition }
             };
             all.into_iter().map(scattered).collect()
         }

@@ -60,7 +60,7 @@ fn choice(material: Material) -> usize {
 }
 
 /// A design problem: examples, first design, and slopes that predict displacements of others.
-pub struct Lesson {
+pub struct DesignProblem {
     /// Width by place, choice and example \[rest widths\].
     widths: Vec<[Vec<f64>; 3]>,
     slopes: Vec<f64>,
@@ -74,13 +74,13 @@ pub struct Lesson {
     objective: f64,
 }
 
-impl Lesson {
+impl DesignProblem {
     /// Makes a problem whose examples have the displacements of `design`.
     pub fn new(examples: &[&Example], slopes: &[f64], design: &[Material]) -> Self {
         let column =
             |place: usize, choice: usize| examples.iter().map(|e| e.choices[place][choice]).collect();
         let total: f64 = examples.iter().map(|example| example.weight).sum();
-        let mut lesson = Lesson {
+        let mut lesson = DesignProblem {
             widths: (0..slopes.len()).map(|place| [0, 1, 2].map(|choice| column(place, choice))).collect(),
             slopes: slopes.to_vec(),
             margins: examples.iter().map(|example| example.displacement * example.right).collect(),
@@ -109,7 +109,7 @@ impl Lesson {
             ..example.clone()
         };
         let examples: Vec<Example> = examples.into_iter().map(displaced).collect();
-        Lesson::new(&examples.iter().collect::<Vec<_>>(), slopes, design)
+        DesignProblem::new(&examples.iter().collect::<Vec<_>>(), slopes, design)
     }
 
     /// Computes the objective from scratch.
@@ -272,7 +272,7 @@ mod tests {
             });
             let best =
                 every.map(|design| objective(&gait, &examples, &slopes, &design)).fold(f64::MIN, f64::max);
-            let mut lesson = Lesson::new(&all, &slopes, &gait.design());
+            let mut lesson = DesignProblem::new(&all, &slopes, &gait.design());
             lesson.solve_from_many(&mut random(seed));
             let (found, design) = (lesson.objective(), lesson.design());
             assert!((found - objective(&gait, &examples, &slopes, &design)).abs() < 1e-9);

@@ -4,7 +4,7 @@ use crate::base::Grid;
 use crate::base::random::{Purpose, stream};
 use crate::body::{Body, Material};
 use crate::response::gait::{Gait, random_image};
-use crate::response::regression::{Response, Shown};
+use crate::response::regression::{RandomRollout, Response};
 use crate::sim::Physics;
 use crate::task::perturbation::Condition;
 use std::ops::Range;
@@ -46,7 +46,7 @@ impl Probing {
         physics: &Physics,
         numbers: Range<usize>,
         roll: impl FnOnce(&Body, &[Grid<f64>], &[Condition]) -> Result<Vec<Option<f64>>, E>,
-    ) -> Result<Vec<Shown>, E> {
+    ) -> Result<Vec<RandomRollout>, E> {
         let probe = gait.probe();
         let image = |number: usize| {
             let mut random = stream(self.seed, Purpose::RandomImages, 0, number as u64);
@@ -61,7 +61,7 @@ impl Probing {
         let shown =
             numbers.zip(&stimuli).zip(displacements).filter_map(|((number, stimulus), displacement)| {
                 let widths = gait.widths(&design, stimulus, physics);
-                Some(Shown { widths, displacement: displacement?, condition: condition(number) })
+                Some(RandomRollout { widths, displacement: displacement?, condition: condition(number) })
             });
         Ok(shown.collect())
     }
@@ -69,6 +69,6 @@ impl Probing {
 
 /// Returns the response from the stable rollouts `shown`, out of `rollouts`; `None` if most are
 /// unstable, or too few stable.
-pub fn response(shown: &[Shown], rollouts: usize) -> Option<Response> {
+pub fn response(shown: &[RandomRollout], rollouts: usize) -> Option<Response> {
     if 2 * shown.len() > rollouts { Response::of(shown) } else { None }
 }

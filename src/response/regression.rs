@@ -199,7 +199,7 @@ pub struct Response {
 
 /// A rollout under a random image.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Shown {
+pub struct RandomRollout {
     /// Target width of each place \[rest widths\].
     pub widths: Vec<f64>,
     /// Displacement to the right \[voxel lengths\].
@@ -211,7 +211,7 @@ pub struct Shown {
 impl Response {
     /// Fits slopes with the penalty that predicts left-out rollouts best. Returns `None` for fewer
     /// than two rollouts per fold.
-    pub fn of(rollouts: &[Shown]) -> Option<Self> {
+    pub fn of(rollouts: &[RandomRollout]) -> Option<Self> {
         let places = rollouts.first()?.widths.len();
         if rollouts.len() < 2 * FOLDS {
             return None;
@@ -312,14 +312,20 @@ mod tests {
     }
 
     /// Simulates a linear body: slopes, an intercept for each condition, noise.
-    fn planted(slopes: &[f64], intercepts: &[f64], noise: f64, count: usize, seed: u64) -> Vec<Shown> {
+    fn planted(
+        slopes: &[f64],
+        intercepts: &[f64],
+        noise: f64,
+        count: usize,
+        seed: u64,
+    ) -> Vec<RandomRollout> {
         let mut random = random(seed);
         let rollout = |number: usize| {
             let widths: Vec<f64> =
                 slopes.iter().map(|_| if random.unit() < 0.45 { 1.6 } else { 0.6 }).collect();
             let condition = number % intercepts.len();
             let displacement = intercepts[condition] + dot(slopes, &widths) + noise * random.normal();
-            Shown { widths, displacement, condition }
+            RandomRollout { widths, displacement, condition }
         };
         (0..count).map(rollout).collect()
     }

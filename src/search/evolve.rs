@@ -8,7 +8,7 @@ use crate::base::stop::Stopped;
 use crate::body::Body;
 use crate::config::Config;
 use crate::genome::{BodySpec, Genome, GenomeError, MutationParams};
-use crate::images::training::Training;
+use crate::images::training::TrainingImages;
 use crate::qd::{ArchiveStats, DescriptorSpace, Evaluated, MapElites, Proposal, Variation};
 use crate::store::checkpoint;
 use crate::store::checkpoint::{Checkpoint, KnownBodies};
@@ -46,7 +46,7 @@ pub(crate) struct Run<'a> {
     config: &'a Config,
     name: &'a str,
     pub(crate) session: &'a Session<'a>,
-    training: Training,
+    training: TrainingImages,
     grouping: Grouping,
     space: DescriptorSpace,
     dimensions: Dimensions,
@@ -65,7 +65,7 @@ impl<'a> Run<'a> {
     pub(crate) fn new(
         (config, name): (&'a Config, &'a str),
         session: &'a Session,
-        training: Training,
+        training: TrainingImages,
         saved: Option<Checkpoint>,
     ) -> Result<Self, Error> {
         let (archive, known, totals, generation) = match saved {
@@ -192,7 +192,7 @@ impl<'a> Run<'a> {
     /// Shows the training images to what is simulated for children.
     fn scored(&self, children: &[Child], session: &Session) -> Result<Vec<Evaluation>, Error> {
         let config = self.config;
-        let Training { stimuli, conditions, .. } = &self.training;
+        let TrainingImages { stimuli, conditions, .. } = &self.training;
         let simulated = |(_, _, robot): &'_ Child| config.objective().simulated(&robot.body).into_owned();
         let bodies: Vec<Body> = children.iter().map(simulated).collect();
         let thresholds = self.admission_thresholds();

@@ -13,7 +13,7 @@ use crate::store::run::{Robot, RunFile};
 use crate::task::answer::{Assignment, is_correct};
 use crate::task::evaluation::fresh_rollouts;
 use crate::task::fitness::Group;
-use crate::task::grouping::Split;
+use crate::task::grouping::ClassSplit;
 use crate::task::grouping::{self, Grouping};
 use crate::task::protocol::{Protocol, RolloutMode};
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,7 +28,7 @@ pub(crate) fn control_steps(config: &Config, cycles: u32) -> u32 {
 }
 
 /// Returns the recognition task that a robot performs; `None` if it always walks the same way.
-pub(crate) fn task_of<'a>(grouping: &'a Grouping, robot: &Robot) -> Option<&'a grouping::Split> {
+pub(crate) fn task_of<'a>(grouping: &'a Grouping, robot: &Robot) -> Option<&'a grouping::ClassSplit> {
     grouping.tasks().iter().find(|split| split.is_called(&robot.task) && !split.is_same_way())
 }
 
@@ -91,7 +91,7 @@ impl<'a> HeldOutRun<'a> {
 pub(crate) struct Trial<'a> {
     pub run: &'a RunFile,
     pub robot: &'a Robot,
-    pub split: &'a Split,
+    pub split: &'a ClassSplit,
     pub images: &'a [ImageRef],
     pub threshold: f64,
 }

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 
 /// The robots to select, and the archives to search.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub struct RobotChoice {
     /// Robots to select.
     pub robots: Selection,
     /// Archives, searched as one; if empty, the published robots if those are named, else the
@@ -38,8 +38,8 @@ pub struct Named {
 ///
 /// # Errors
 /// Returns an error if no robot matches, or if a signal stopped the validation.
-pub fn named(options: &Options, session: &Session) -> Result<Vec<Named>, Error> {
-    let Options { seed, .. } = options;
+pub fn named(options: &RobotChoice, session: &Session) -> Result<Vec<Named>, Error> {
+    let RobotChoice { seed, .. } = options;
     let (archives, robots) = robots::archives(options.archives.clone(), options.robots.clone())?;
     if let (Selection::Ids(ids), [archive]) = (&robots, &archives[..]) {
         let one = |robot: &String| Named { archive: archive.clone(), robot: robot.clone() };
@@ -63,14 +63,14 @@ pub fn named(options: &Options, session: &Session) -> Result<Vec<Named>, Error> 
 
 /// Returns the best `count` of each task of a run on validation images.
 fn ranked<'a>(
-    options: &Options,
+    options: &RobotChoice,
     source: &'a StoredRun,
     count: usize,
     session: &Session,
 ) -> Result<Vec<(&'a Robot, Validated)>, Error> {
     // Some may not be physical: validate as many as the run does at its end.
     let known = if options.physical_only { source.run.config.validation.best } else { 0 };
-    let search = validation::Options { archive: source.path.clone(), best: Some(count.max(known)) };
+    let search = validation::ValidationOptions { archive: source.path.clone(), best: Some(count.max(known)) };
     let Some(best) = validation::validate(&search, session)? else {
         let text = "stopped before the robots were chosen; nothing is shown";
         return Err(Error::stopped(text.to_string()).remedy(Remedy::Repeat));

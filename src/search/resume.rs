@@ -4,7 +4,7 @@
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
 use crate::config::{Config, differing};
-use crate::images::training::Training;
+use crate::images::training::TrainingImages;
 use crate::store::checkpoint;
 use crate::store::checkpoint::{Checkpoint, KnownBodies};
 use crate::store::folder::RunFolder;
@@ -22,7 +22,7 @@ use std::path::Path;
 pub(crate) fn saved(
     folder: &RunFolder,
     config: &Config,
-    training: &Training,
+    training: &TrainingImages,
     mut warn: impl FnMut(String),
 ) -> Result<Option<Checkpoint>, Error> {
     let place = folder.path().display().to_string();
@@ -90,7 +90,7 @@ fn without_checkpoint(path: &Path) -> Result<Checkpoint, Error> {
 }
 
 /// Checks that a run can resume under a config: everything its results depend on must match.
-fn compatible(saved: &Checkpoint, config: &Config, training: &Training) -> Result<(), Error> {
+fn compatible(saved: &Checkpoint, config: &Config, training: &TrainingImages) -> Result<(), Error> {
     let differs = |text: String| {
         Error::input(text).advice("resume with the config it was started with").remedy(Remedy::Replace)
     };

@@ -60,7 +60,7 @@ pub(crate) struct Wanted {
 
 /// The run to choose from, and the number of robots.
 #[derive(Clone, Debug)]
-pub struct Options {
+pub struct ValidationOptions {
     /// Path of the run.json.
     pub archive: PathBuf,
     /// Number of robots of each task; `None`: that of the config.
@@ -72,7 +72,7 @@ pub struct Options {
 ///
 /// # Errors
 /// Returns an error if run or data is unsuitable, or if there are not enough images.
-pub fn validate(options: &Options, session: &Session) -> Result<Option<Vec<Validated>>, Error> {
+pub fn validate(options: &ValidationOptions, session: &Session) -> Result<Option<Vec<Validated>>, Error> {
     let source = StoredRun::read(&options.archive)?;
     let config = &source.run.config;
     let count = options.best.unwrap_or(config.validation.best);
@@ -256,7 +256,7 @@ fn screened(
 ) -> Result<Option<Vec<Validated>>, Error> {
     let config: &Config = &run.config;
     let stimuli = see_all(config, dataset, Split::Train, images)?;
-    let split_of = |robot: &Robot| -> Option<&grouping::Split> {
+    let split_of = |robot: &Robot| -> Option<&grouping::ClassSplit> {
         grouping.tasks().iter().find(|split| split.is_called(&robot.task))
     };
     let mut tasks = BTreeMap::<&str, Vec<&Robot>>::new();

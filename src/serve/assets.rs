@@ -1,12 +1,12 @@
 //! The page's files, embedded in the program.
 
-use crate::serve::http::Response;
+use crate::serve::http::HttpResponse;
 
 const JS: &str = "text/javascript; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";
 
 /// Returns the file at a path.
-pub fn asset(path: &str) -> Option<Response> {
+pub fn asset(path: &str) -> Option<HttpResponse> {
     let (content_type, text) = match path {
         "/" => ("text/html; charset=utf-8", include_str!("page/page.html")),
         "/icon.svg" => ("image/svg+xml", include_str!("page/icon.svg")),
@@ -27,5 +27,5 @@ pub fn asset(path: &str) -> Option<Response> {
         "/editor.js" => (JS, include_str!("page/editor.js")),
         _ => return None,
     };
-    Some(Response::file(content_type, text))
+    Some(HttpResponse::file(content_type, text))
 }

@@ -1,11 +1,11 @@
-//! [`Catalogue`]: the robots that the page offers, published ones and those of archives.
+//! [`RobotCatalogue`]: the robots that the page offers, published ones and those of archives.
 
 use crate::base::error::Error;
 use crate::body::{Body, VoxelCounts};
 use crate::config::Config;
 use crate::robots::published;
 use crate::serve::course::Course;
-use crate::serve::refusal::Refusal;
+use crate::serve::refusal::HttpRefusal;
 use crate::shipped::gallery;
 use crate::shipped::read_text;
 use crate::sim::Physics;
@@ -96,7 +96,7 @@ pub struct Audited {
 
 /// A collection without its robots, for the list of collections.
 #[derive(Clone, Debug, Serialize)]
-pub struct Summary {
+pub struct CollectionSummary {
     /// The number of the collection, from 0.
     pub index: usize,
     /// The name on the page.
@@ -158,7 +158,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(500);
 
 /// All collections: the built-in ones first, led by the trained robots, then archives. Archives are
 /// reloaded when they change, and runs that begin or continue meanwhile are added.
-pub struct Catalogue {
+pub struct RobotCatalogue {
     built_in: Vec<Arc<Collection>>,
     /// The archives as of the last poll; locked only to copy or replace the list.
     known: Mutex<Arc<[Known]>>,
@@ -179,7 +179,7 @@ struct Watch {
     looked: Option<Instant>,
 }
 
-impl Catalogue {
+impl RobotCatalogue {
     /// Reads the archives, and the audits beside them. An unusable audit becomes a note, and so
     /// does a `newest` run, which nobody named, if it cannot be read. Changed runs in the folder
     /// `runs` are added later.
@@ -211,7 +211,7 @@ impl Catalogue {
         {
             notes.push(format!("{error}; left out"));
         }
-        Ok((Catalogue { built_in, known: Mutex::new(watch.known()), watch: Mutex::new(watch) }, notes))
+        Ok((RobotCatalogue { built_in, known: Mutex::new(watch.known()), watch: Mutex::new(watch) }, notes))
     }
 
     /// Returns the current archives, or the last known ones while another request polls.
@@ -231,8 +231,8 @@ impl Catalogue {
     }
 
     /// Summarises all collections.
-    pub fn list(&self) -> Vec<Summary> {
-        let short = |(from, asked, changes): (&Collection, Option<u64>, u64)| Summary {
+    pub fn list(&self) -> Vec<CollectionSummary> {
+        let short = |(from, asked, changes): (&Collection, Option<u64>, u64)| CollectionSummary {
             index: 0,
             name: from.name.clone(),
             path: from.path.as_ref().map(|path| path.display().to_string()),
@@ -250,7 +250,7 @@ impl Catalogue {
             (&**collection, Some(collection.config.generations), *changes)
         });
         let list = built_in.chain(read).map(short).enumerate();
-        list.map(|(index, summary)| Summary { index, ..summary }).collect()
+        list.map(|(index, summary)| CollectionSummary { index, ..summary }).collect()
     }
 
     /// Returns all collections.
@@ -263,10 +263,10 @@ impl Catalogue {
     ///
     /// # Errors
     /// Returns an error if there is no such collection.
-    pub fn collection(&self, index: usize) -> Result<Arc<Collection>, Refusal> {
+    pub fn collection(&self, index: usize) -> Result<Arc<Collection>, HttpRefusal> {
         let collections = self.collections();
         let unknown =
-            || Refusal::Unknown(format!("there is no archive {index}: there are {}", collections.len()));
+            || HttpRefusal::Unknown(format!("there is no archive {index}: there are {}", collections.len()));
         collections.get(index).cloned().ok_or_else(unknown)
     }
 
@@ -274,12 +274,12 @@ impl Catalogue {
     ///
     /// # Errors
     /// Returns an error if there is no such run, or its `metrics.csv` cannot be read.
-    pub fn course(&self, index: usize) -> Result<Course, Refusal> {
+    pub fn course(&self, index: usize) -> Result<Course, HttpRefusal> {
         let collection = self.collection(index)?;
         let Some(path) = &collection.path else {
-            return Err(Refusal::Unknown(format!("{}: it is no run", collection.name)));
+            return Err(HttpRefusal::Unknown(format!("{}: it is no run", collection.name)));
         };
-        Course::of(path, collection.config.generations).map_err(|error| Refusal::Unknown(error.message))
+        Course::of(path, collection.config.generations).map_err(|error| HttpRefusal::Unknown(error.message))
     }
 }
 
@@ -371,16 +371,16 @@ impl Collection {
     ///
     /// # Errors
     /// Returns an error if there is no such robot.
-    pub fn robot(&self, id: &str) -> Result<&Entry, Refusal> {
+    pub fn robot(&self, id: &str) -> Result<&Entry, HttpRefusal> {
         let found = self.robots.iter().chain(&self.gone).find(|robot| robot.id == id);
-        found.ok_or_else(|| Refusal::Unknown(format!("{}: there is no robot {id:?}", self.name)))
+        found.ok_or_else(|| HttpRefusal::Unknown(format!("{}: there is no robot {id:?}", self.name)))
     }
 
     /// Returns a robot by its id, with everything that its simulation depends on.
     ///
     /// # Errors
     /// Returns an error if there is no such robot.
-    pub fn who(&self, id: &str) -> Result<Who, Refusal> {
+    pub fn who(&self, id: &str) -> Result<Who, HttpRefusal> {
         let (robot, config) = (self.robot(id)?, &self.config);
         Ok(Who {
             body: robot.body.clone(),
@@ -504,9 +504,9 @@ mod tests {
     }
 
     /// Polls again and returns the names of the archives' folders.
-    fn known(catalogue: &Catalogue) -> Vec<String> {
+    fn known(catalogue: &RobotCatalogue) -> Vec<String> {
         catalogue.watch.lock().unwrap().looked = None;
-        let folder = |from: &Summary| {
+        let folder = |from: &CollectionSummary| {
             let path = PathBuf::from(from.path.clone()?);
             Some(path.parent()?.file_name()?.to_string_lossy().into_owned())
         };
@@ -516,7 +516,7 @@ mod tests {
     #[test]
     fn a_run_that_cannot_be_read_is_read_again_only_when_it_has_changed() {
         let runs = tempfile::tempdir().unwrap();
-        let (catalogue, _) = Catalogue::open(&[], None, runs.path()).unwrap();
+        let (catalogue, _) = RobotCatalogue::open(&[], None, runs.path()).unwrap();
         let good = run();
         // Same length and time.
         let path = write(runs.path(), "a", &good.replacen('{', "[", 1));
@@ -542,7 +542,7 @@ mod tests {
     #[test]
     fn requests_are_answered_while_another_one_reads() {
         let runs = tempfile::tempdir().unwrap();
-        let (catalogue, _) = Catalogue::open(&[], None, runs.path()).unwrap();
+        let (catalogue, _) = RobotCatalogue::open(&[], None, runs.path()).unwrap();
         write(runs.path(), "a", run());
         let reads = catalogue.watch.lock().unwrap();
         assert_eq!((catalogue.list().len(), catalogue.collections().len()), (3, 3));
@@ -556,7 +556,7 @@ mod tests {
     fn a_run_by_several_names_is_listed_once() {
         let runs = tempfile::tempdir().unwrap();
         let path = write(runs.path(), "a", run());
-        let (catalogue, _) = Catalogue::open(std::slice::from_ref(&path), None, runs.path()).unwrap();
+        let (catalogue, _) = RobotCatalogue::open(std::slice::from_ref(&path), None, runs.path()).unwrap();
         std::os::unix::fs::symlink("a", runs.path().join("link")).unwrap();
         write(runs.path(), "a", run());
         assert_eq!(known(&catalogue), ["a"]);

@@ -1,6 +1,6 @@
 //! [`Hosts`]: the names under which a browser may reach the page.
 
-use crate::serve::http::{Request, Response};
+use crate::serve::http::{HttpResponse, Request};
 use std::net::IpAddr;
 use std::str::FromStr;
 
@@ -62,13 +62,13 @@ impl Hosts {
     ///
     /// # Errors
     /// Returns the refusal to send.
-    pub fn check(&self, request: &Request) -> Result<(), Response> {
+    pub fn check(&self, request: &Request) -> Result<(), HttpResponse> {
         let Some(host) = request.header("host")? else {
-            return Err(Response::refusal(400, "expected a Host header"));
+            return Err(HttpResponse::refusal(400, "expected a Host header"));
         };
         if !host_of(host).is_some_and(|name| self.allows(&name)) {
             let text = format!("Host: {host}: expected localhost or 127.0.0.1; {}", self.advice);
-            return Err(Response::refusal(403, &text));
+            return Err(HttpResponse::refusal(403, &text));
         }
         // Programs like curl send no Origin; browsers always do where it matters.
         let origin = request.header("origin")?.filter(|_| request.method == "POST");
@@ -83,7 +83,7 @@ impl Hosts {
                     "Origin: {origin}: requests from other sites are refused, and this page is at {host}; \
                      a proxy has to pass on the Host header as it is"
                 );
-                Err(Response::refusal(403, &text))
+                Err(HttpResponse::refusal(403, &text))
             }
             _ => Ok(()),
         }

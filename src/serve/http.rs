@@ -39,12 +39,12 @@ impl Request {
     /// # Errors
     /// Returns a refusal if it occurs more than once: one might pass the check and another take
     /// effect.
-    pub fn header(&self, name: &str) -> Result<Option<&str>, Response> {
+    pub fn header(&self, name: &str) -> Result<Option<&str>, HttpResponse> {
         let mut found = self.headers.iter().filter(|(own, _)| own == name);
         let first = found.next().map(|(_, value)| value.as_str());
         match found.next() {
             None => Ok(first),
-            Some(_) => Err(Response::refusal(400, &format!("expected one header {name}, found several"))),
+            Some(_) => Err(HttpResponse::refusal(400, &format!("expected one header {name}, found several"))),
         }
     }
 
@@ -57,7 +57,7 @@ impl Request {
 
 /// A complete response, sent at once.
 #[derive(Debug)]
-pub struct Response {
+pub struct HttpResponse {
     status: u16,
     content_type: &'static str,
     body: Vec<u8>,
@@ -65,34 +65,34 @@ pub struct Response {
     allow: Option<&'static str>,
 }
 
-impl Response {
+impl HttpResponse {
     /// Creates the response for an embedded file.
     pub fn file(content_type: &'static str, text: &str) -> Self {
-        Response { status: 200, content_type, body: text.as_bytes().to_vec(), allow: None }
+        HttpResponse { status: 200, content_type, body: text.as_bytes().to_vec(), allow: None }
     }
 
     /// Creates a JSON response.
     pub fn json(value: &impl Serialize) -> Self {
         match serde_json::to_vec(value) {
-            Ok(body) => Response { status: 200, content_type: "application/json", body, allow: None },
-            Err(error) => Response::refusal(500, &error.to_string()),
+            Ok(body) => HttpResponse { status: 200, content_type: "application/json", body, allow: None },
+            Err(error) => HttpResponse::refusal(500, &error.to_string()),
         }
     }
 
     /// Creates a response without content.
     pub fn done() -> Self {
-        Response { status: 204, content_type: "text/plain; charset=utf-8", body: Vec::new(), allow: None }
+        HttpResponse { status: 204, content_type: "text/plain; charset=utf-8", body: Vec::new(), allow: None }
     }
 
     /// Creates an error response of one line.
     pub fn refusal(status: u16, line: &str) -> Self {
         let body = format!("{}\n", one_line(line)).into_bytes();
-        Response { status, content_type: "text/plain; charset=utf-8", body, allow: None }
+        HttpResponse { status, content_type: "text/plain; charset=utf-8", body, allow: None }
     }
 
     /// Creates the response to a request with a wrong method.
     pub fn wrong_method(allow: &'static str) -> Self {
-        Response { allow: Some(allow), ..Response::refusal(405, &format!("expected {allow}")) }
+        HttpResponse { allow: Some(allow), ..HttpResponse::refusal(405, &format!("expected {allow}")) }
     }
 
     /// Sends the response; only the head if `head_only`, in answer to HEAD.
@@ -152,34 +152,35 @@ pub fn begin_events(stream: &mut TcpStream) -> io::Result<()> {
 ///
 /// # Errors
 /// Returns the refusal to send if the data are no valid request.
-pub fn read(stream: &mut TcpStream) -> Result<Option<Request>, Response> {
-    let broken = |error: &io::Error| Response::refusal(400, &format!("the request cannot be read: {error}"));
+pub fn read(stream: &mut TcpStream) -> Result<Option<Request>, HttpResponse> {
+    let broken =
+        |error: &io::Error| HttpResponse::refusal(400, &format!("the request cannot be read: {error}"));
     let deadline = Instant::now() + TO_READ;
     stream.set_write_timeout(Some(TO_WRITE)).map_err(|error| broken(&error))?;
     let mut bytes = Vec::new();
     let (mut request, begin) = loop {
         let found = parse(&bytes)?;
         if found.as_ref().map_or(bytes.len(), |(_, begin)| *begin) > MAX_HEAD {
-            return Err(Response::refusal(431, "the request's head is too long"));
+            return Err(HttpResponse::refusal(431, "the request's head is too long"));
         }
         if let Some(found) = found {
             break found;
         }
         match more(stream, &mut bytes, deadline) {
             Ok(0) if bytes.is_empty() => return Ok(None),
-            Ok(0) => return Err(Response::refusal(400, "the request ends in its head")),
+            Ok(0) => return Err(HttpResponse::refusal(400, "the request ends in its head")),
             Ok(_) => {}
             // Browsers open connections that they then do not use.
             Err(_) if bytes.is_empty() => return Ok(None),
-            Err(_) => return Err(Response::refusal(408, "the request did not come in time")),
+            Err(_) => return Err(HttpResponse::refusal(408, "the request did not come in time")),
         }
     };
     let length = length(&request)?;
     while bytes.len() < begin + length {
         match more(stream, &mut bytes, deadline) {
-            Ok(0) => return Err(Response::refusal(400, "the request ends in its body")),
+            Ok(0) => return Err(HttpResponse::refusal(400, "the request ends in its body")),
             Ok(_) => {}
-            Err(_) => return Err(Response::refusal(408, "the request did not come in time")),
+            Err(_) => return Err(HttpResponse::refusal(408, "the request did not come in time")),
         }
     }
     request.body = bytes[begin..begin + length].to_vec();
@@ -199,16 +200,16 @@ fn more(stream: &mut TcpStream, bytes: &mut Vec<u8>, deadline: Instant) -> io::R
 }
 
 /// Parses a request without its body, and its offset; `None` if the head is incomplete.
-fn parse(bytes: &[u8]) -> Result<Option<(Request, usize)>, Response> {
+fn parse(bytes: &[u8]) -> Result<Option<(Request, usize)>, HttpResponse> {
     let mut space = [httparse::EMPTY_HEADER; MAX_HEADERS];
     let mut head = httparse::Request::new(&mut space);
     let begin = match head.parse(bytes) {
         Ok(httparse::Status::Complete(begin)) => begin,
         Ok(httparse::Status::Partial) => return Ok(None),
         Err(httparse::Error::TooManyHeaders) => {
-            return Err(Response::refusal(431, &format!("expected at most {MAX_HEADERS} headers")));
+            return Err(HttpResponse::refusal(431, &format!("expected at most {MAX_HEADERS} headers")));
         }
-        Err(error) => return Err(Response::refusal(400, &format!("not an HTTP request: {error}"))),
+        Err(error) => return Err(HttpResponse::refusal(400, &format!("not an HTTP request: {error}"))),
     };
     let target = head.path.expect("a head that is whole has a path");
     let (path, query) = target.split_once('?').unwrap_or((target, ""));
@@ -225,13 +226,13 @@ fn parse(bytes: &[u8]) -> Result<Option<(Request, usize)>, Response> {
     Ok(Some((request, begin)))
 }
 
-fn length(request: &Request) -> Result<usize, Response> {
+fn length(request: &Request) -> Result<usize, HttpResponse> {
     if request.headers.iter().any(|(own, _)| own == "transfer-encoding") {
-        return Err(Response::refusal(411, "expected a body with a Content-Length"));
+        return Err(HttpResponse::refusal(411, "expected a body with a Content-Length"));
     }
     let Some(digits) = request.header("content-length")? else {
         return match request.method.as_str() {
-            "POST" => Err(Response::refusal(411, "expected a Content-Length")),
+            "POST" => Err(HttpResponse::refusal(411, "expected a Content-Length")),
             _ => Ok(0),
         };
     };
@@ -239,9 +240,9 @@ fn length(request: &Request) -> Result<usize, Response> {
     match digits.map(str::parse::<usize>) {
         Some(Ok(length)) if length <= MAX_BODY => Ok(length),
         Some(Ok(_)) => {
-            Err(Response::refusal(413, &format!("the request's body is longer than {MAX_BODY} bytes")))
+            Err(HttpResponse::refusal(413, &format!("the request's body is longer than {MAX_BODY} bytes")))
         }
-        _ => Err(Response::refusal(400, "Content-Length: expected one number")),
+        _ => Err(HttpResponse::refusal(400, "Content-Length: expected one number")),
     }
 }
 

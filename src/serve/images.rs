@@ -5,8 +5,8 @@ use crate::base::Grid;
 use crate::base::error::Error;
 use crate::data::dataset::{BUILTIN, Dataset, Split};
 use crate::images::whereabouts::{Whereabouts, load_dataset_of};
-use crate::serve::catalogue::Catalogue;
-use crate::serve::refusal::Refusal;
+use crate::serve::catalogue::RobotCatalogue;
+use crate::serve::refusal::HttpRefusal;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -53,7 +53,7 @@ impl ImageSets {
     ///
     /// # Errors
     /// Returns an error if the built-in digits cannot be made (which does not happen).
-    pub fn open(catalogue: &Catalogue, data: Option<&Path>) -> Result<(Self, Vec<String>), Error> {
+    pub fn open(catalogue: &RobotCatalogue, data: Option<&Path>) -> Result<(Self, Vec<String>), Error> {
         let refuse = |error: crate::data::dataset::DatasetError| Error::input(error.to_string());
         let mut sets = Vec::new();
         // Each with the name of its set.
@@ -103,22 +103,28 @@ impl ImageSets {
             .collect()
     }
 
-    fn set(&self, name: &str) -> Result<&Dataset, Refusal> {
+    fn set(&self, name: &str) -> Result<&Dataset, HttpRefusal> {
         let found = self.sets.iter().find(|set| set.name() == name);
-        found.ok_or_else(|| Refusal::Unknown(format!("there is no set of images {name:?}")))
+        found.ok_or_else(|| HttpRefusal::Unknown(format!("there is no set of images {name:?}")))
     }
 
     /// Returns `count` images of a class, starting at number `from`.
     ///
     /// # Errors
     /// Returns an error if there is no such set.
-    pub fn page(&self, set: &str, class: u8, from: usize, count: usize) -> Result<Vec<TestImage>, Refusal> {
+    pub fn page(
+        &self,
+        set: &str,
+        class: u8,
+        from: usize,
+        count: usize,
+    ) -> Result<Vec<TestImage>, HttpRefusal> {
         let dataset = self.set(set)?;
         let indices = dataset.indices_of(Split::Test, class).iter().skip(from).take(count.min(MAX_PAGE));
         indices
             .map(|&index| {
                 let pixels = dataset.image(Split::Test, index);
-                let pixels = pixels.map_err(|error| Refusal::Unknown(error.to_string()))?;
+                let pixels = pixels.map_err(|error| HttpRefusal::Unknown(error.to_string()))?;
                 Ok(TestImage { index, label: class, pixels })
             })
             .collect()
@@ -128,8 +134,8 @@ impl ImageSets {
     ///
     /// # Errors
     /// Returns an error if there is no such image.
-    pub fn image(&self, name: &ImageName) -> Result<TestImage, Refusal> {
-        let unknown = |error: crate::data::dataset::DatasetError| Refusal::Unknown(error.to_string());
+    pub fn image(&self, name: &ImageName) -> Result<TestImage, HttpRefusal> {
+        let unknown = |error: crate::data::dataset::DatasetError| HttpRefusal::Unknown(error.to_string());
         let (set, index) = (self.set(&name.set)?, name.index);
         let label = set.label(Split::Test, index).map_err(unknown)?;
         Ok(TestImage { index, label, pixels: set.image(Split::Test, index).map_err(unknown)? })

@@ -22,18 +22,18 @@ use crate::body::Body;
 use crate::commands::simulate::Scenario;
 use crate::sim::{Physics, Start};
 use crate::task::protocol::Protocol;
-use catalogue::Catalogue;
+use catalogue::RobotCatalogue;
 use hosts::Hosts;
 use images::ImageSets;
-use refusal::Refusal;
-use request::Plan;
+use refusal::HttpRefusal;
+use request::RolloutPlan;
 use serde::Serialize;
 use simulations::Simulations;
 use std::path::PathBuf;
 
 /// The options of `morphcog serve`.
 #[derive(Clone, Debug, Default)]
-pub struct Options {
+pub struct ServeOptions {
     /// The run.json files to browse.
     pub archives: Vec<PathBuf>,
     /// Another run, not named by the user: if it cannot be read, a note says so.
@@ -49,7 +49,7 @@ pub struct Options {
 /// Everything that a page can request.
 pub struct Service {
     /// The robots to choose from.
-    pub catalogue: Catalogue,
+    pub catalogue: RobotCatalogue,
     /// The test images to choose from.
     pub images: ImageSets,
     /// The simulations that are running.
@@ -62,7 +62,7 @@ pub struct Service {
 
 /// The response to `/api/status`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct Status {
+pub struct ServiceStatus {
     /// The version of the program.
     pub version: &'static str,
     /// The number of simulations running now.
@@ -109,9 +109,9 @@ impl Service {
     ///
     /// # Errors
     /// Returns an error if an archive is invalid, or the system has no threads left.
-    pub fn open(options: &Options) -> Result<(Self, Vec<String>), Error> {
-        let Options { archives, newest, data, runs, hosts } = options;
-        let (catalogue, mut notes) = Catalogue::open(archives, newest.as_deref(), runs)?;
+    pub fn open(options: &ServeOptions) -> Result<(Self, Vec<String>), Error> {
+        let ServeOptions { archives, newest, data, runs, hosts } = options;
+        let (catalogue, mut notes) = RobotCatalogue::open(archives, newest.as_deref(), runs)?;
         let (images, missing) = ImageSets::open(&catalogue, data.as_deref())?;
         notes.extend(missing);
         let (simulations, pool) = (Simulations::default(), threads::pool(None)?);
@@ -119,8 +119,8 @@ impl Service {
     }
 
     /// Returns the current status.
-    pub fn status(&self) -> Status {
-        Status {
+    pub fn status(&self) -> ServiceStatus {
+        ServiceStatus {
             version: env!("CARGO_PKG_VERSION"),
             simulations: self.simulations.running(),
             max_simulations: simulations::MAX_SIMULATIONS,
@@ -150,12 +150,12 @@ impl Service {
     ///
     /// # Errors
     /// Returns an error if it is invalid, or the page does not support it.
-    pub fn load(&self, text: &str) -> Result<Loaded, Refusal> {
+    pub fn load(&self, text: &str) -> Result<Loaded, HttpRefusal> {
         let scenario = Scenario::parse(text, "scenario")?;
         if *scenario.physics() != Physics::default() {
             let text =
                 "scenario: physics: the page has EvoGym's constants only; morphcog simulate takes others";
-            return Err(Refusal::Wrong(text.to_string()));
+            return Err(HttpRefusal::Wrong(text.to_string()));
         }
         let Protocol { start_row: row, start_column: column, .. } = Protocol::default();
         let starts_here = scenario.start() == Start { row, column };
@@ -180,7 +180,7 @@ impl Service {
     ///
     /// # Errors
     /// Returns an error if the request is invalid.
-    pub fn plan(&self, request: request::SimulationRequest) -> Result<Plan, Refusal> {
+    pub fn plan(&self, request: request::SimulationRequest) -> Result<RolloutPlan, HttpRefusal> {
         request.plan(&self.catalogue, &self.images)
     }
 }

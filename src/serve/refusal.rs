@@ -1,10 +1,10 @@
-//! [`Refusal`]: the reasons for refusing a request.
+//! [`HttpRefusal`]: the reasons for refusing a request.
 
 use crate::base::error::Error;
 
 /// A reason for refusing a request, with one clear line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Refusal {
+pub enum HttpRefusal {
     /// The request is invalid.
     #[error("{0}")]
     Wrong(String),
@@ -16,8 +16,8 @@ pub enum Refusal {
     Busy(String),
 }
 
-impl From<Error> for Refusal {
+impl From<Error> for HttpRefusal {
     fn from(error: Error) -> Self {
-        Refusal::Wrong(error.message)
+        HttpRefusal::Wrong(error.message)
     }
 }

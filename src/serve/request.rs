@@ -2,9 +2,9 @@
 
 use crate::base::Grid;
 use crate::body::Body;
-use crate::serve::catalogue::{Catalogue, Who};
+use crate::serve::catalogue::{RobotCatalogue, Who};
 use crate::serve::images::{ImageName, ImageSets};
-use crate::serve::refusal::Refusal;
+use crate::serve::refusal::HttpRefusal;
 use crate::sim::Physics;
 use crate::task::protocol::Protocol;
 use crate::task::stimulus::{Encoding, Reduction, StimulusParams, stimulus};
@@ -20,7 +20,7 @@ pub const MAX_SPEED: f64 = 16.0;
 /// A robot of a collection, or any body with the parameters of its stimulus.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Subject {
+pub struct SubjectRequest {
     /// The number of the collection.
     archive: Option<usize>,
     /// The id of the robot there.
@@ -34,7 +34,7 @@ pub struct Subject {
 /// The visible image, at most one of the three; none is dark.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Shown {
+pub struct ImageChoice {
     /// A drawing: 0 paper … 255 ink, rows from the top.
     drawing: Option<Grid<u8>>,
     /// A test image.
@@ -48,10 +48,10 @@ pub struct Shown {
 #[serde(deny_unknown_fields)]
 pub struct SimulationRequest {
     /// The robot.
-    subject: Subject,
+    subject: SubjectRequest,
     /// The image.
     #[serde(default)]
-    shown: Shown,
+    shown: ImageChoice,
     /// The control steps per image; the default is the robot's protocol.
     control_steps: Option<u32>,
     /// The speed as a multiple of real time; 0: as fast as possible. Default 1.
@@ -62,9 +62,9 @@ pub struct SimulationRequest {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SeeRequest {
-    subject: Subject,
+    subject: SubjectRequest,
     #[serde(default)]
-    shown: Shown,
+    shown: ImageChoice,
 }
 
 /// A request to change a running simulation.
@@ -72,7 +72,7 @@ pub struct SeeRequest {
 #[serde(deny_unknown_fields)]
 pub struct ChangeRequest {
     /// The image from now on.
-    pub shown: Option<Shown>,
+    pub shown: Option<ImageChoice>,
     /// The speed as a multiple of real time; 0: as fast as possible.
     pub speed: Option<f64>,
     /// True to pause, false to continue.
@@ -93,11 +93,11 @@ impl Pace {
     ///
     /// # Errors
     /// Returns an error if it is no valid speed.
-    pub fn of(speed: f64) -> Result<Self, Refusal> {
+    pub fn of(speed: f64) -> Result<Self, HttpRefusal> {
         match speed {
             0.0 => Ok(Pace::Free),
             times if (0.1..=MAX_SPEED).contains(&times) => Ok(Pace::Times(times)),
-            _ => Err(Refusal::Wrong(format!(
+            _ => Err(HttpRefusal::Wrong(format!(
                 "speed: {speed}: expected 0 (as fast as possible) or 0.1 to {MAX_SPEED}"
             ))),
         }
@@ -106,7 +106,7 @@ impl Pace {
 
 /// A stimulus with its class, if that is known.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Seen {
+pub struct SeenPixels {
     /// The stimulus, H × W in \[0, 1\].
     pub stimulus: Grid<f64>,
     /// The class of a test image.
@@ -115,23 +115,23 @@ pub struct Seen {
 
 /// A valid plan for a simulation.
 #[derive(Clone, Debug)]
-pub struct Plan {
+pub struct RolloutPlan {
     /// The robot.
     pub who: Who,
     /// The first stimulus.
-    pub seen: Seen,
+    pub seen: SeenPixels,
     /// The pace.
     pub pace: Pace,
 }
 
-impl Subject {
-    fn find(self, catalogue: &Catalogue) -> Result<Who, Refusal> {
-        let wrong = |text: &str| Err(Refusal::Wrong(text.to_string()));
+impl SubjectRequest {
+    fn find(self, catalogue: &RobotCatalogue) -> Result<Who, HttpRefusal> {
+        let wrong = |text: &str| Err(HttpRefusal::Wrong(text.to_string()));
         match self {
-            Subject { archive: Some(index), robot: Some(id), body: None, encoding: None } => {
+            SubjectRequest { archive: Some(index), robot: Some(id), body: None, encoding: None } => {
                 catalogue.collection(index)?.who(&id)
             }
-            Subject { archive: None, robot: None, body: Some(body), encoding } => {
+            SubjectRequest { archive: None, robot: None, body: Some(body), encoding } => {
                 if !body.is_connected() {
                     return wrong(
                         "subject.body: expected at least one voxel, and all hanging together through their sides",
@@ -150,61 +150,67 @@ impl Subject {
     }
 }
 
-impl Shown {
+impl ImageChoice {
     /// Converts the image to the stimulus of a body.
     ///
     /// # Errors
     /// Returns an error if the image is invalid.
-    pub fn seen(self, who: &Who, images: &ImageSets) -> Result<Seen, Refusal> {
+    pub fn seen(self, who: &Who, images: &ImageSets) -> Result<SeenPixels, HttpRefusal> {
         let (height, width) = (who.body.height(), who.body.width());
         let reduce = |pixels: &Grid<u8>| {
             stimulus(pixels, height, width, &who.encoding)
-                .map_err(|error| Refusal::Wrong(format!("shown: {error}")))
+                .map_err(|error| HttpRefusal::Wrong(format!("shown: {error}")))
         };
         match self {
-            Shown { drawing: None, image: None, stimulus: None } => {
-                Ok(Seen { stimulus: Grid::filled(height, width, 0.0), label: None })
+            ImageChoice { drawing: None, image: None, stimulus: None } => {
+                Ok(SeenPixels { stimulus: Grid::filled(height, width, 0.0), label: None })
             }
-            Shown { drawing: Some(pixels), image: None, stimulus: None } => {
+            ImageChoice { drawing: Some(pixels), image: None, stimulus: None } => {
                 let (rows, columns) = (pixels.height(), pixels.width());
                 if rows > MAX_PICTURE || columns > MAX_PICTURE {
-                    return Err(Refusal::Wrong(format!(
+                    return Err(HttpRefusal::Wrong(format!(
                         "shown.drawing: {rows} × {columns} pixels, expected at most {MAX_PICTURE} × {MAX_PICTURE}"
                     )));
                 }
-                Ok(Seen { stimulus: reduce(&pixels)?, label: None })
+                Ok(SeenPixels { stimulus: reduce(&pixels)?, label: None })
             }
-            Shown { drawing: None, image: Some(name), stimulus: None } => {
+            ImageChoice { drawing: None, image: Some(name), stimulus: None } => {
                 let image = images.image(&name)?;
-                Ok(Seen { stimulus: reduce(&image.pixels)?, label: Some(image.label) })
+                Ok(SeenPixels { stimulus: reduce(&image.pixels)?, label: Some(image.label) })
             }
-            Shown { drawing: None, image: None, stimulus: Some(given) } => {
+            ImageChoice { drawing: None, image: None, stimulus: Some(given) } => {
                 if (given.height(), given.width()) != (height, width) {
                     let (rows, columns) = (given.height(), given.width());
-                    return Err(Refusal::Wrong(format!(
+                    return Err(HttpRefusal::Wrong(format!(
                         "shown.stimulus: {rows} × {columns} pixels, expected {height} × {width} as the body"
                     )));
                 }
                 if given.cells().iter().any(|pixel| !(0.0..=1.0).contains(pixel)) {
-                    return Err(Refusal::Wrong("shown.stimulus: expected numbers from 0 to 1".to_string()));
+                    return Err(HttpRefusal::Wrong(
+                        "shown.stimulus: expected numbers from 0 to 1".to_string(),
+                    ));
                 }
-                Ok(Seen { stimulus: given, label: None })
+                Ok(SeenPixels { stimulus: given, label: None })
             }
-            _ => Err(Refusal::Wrong("shown: expected one of drawing, image, stimulus".to_string())),
+            _ => Err(HttpRefusal::Wrong("shown: expected one of drawing, image, stimulus".to_string())),
         }
     }
 }
 
 impl SimulationRequest {
-    pub(crate) fn plan(self, catalogue: &Catalogue, images: &ImageSets) -> Result<Plan, Refusal> {
+    pub(crate) fn plan(
+        self,
+        catalogue: &RobotCatalogue,
+        images: &ImageSets,
+    ) -> Result<RolloutPlan, HttpRefusal> {
         let mut who = self.subject.find(catalogue)?;
         let steps = self.control_steps.unwrap_or(who.protocol.control_steps.min(MAX_STEPS));
         if !(1..=MAX_STEPS).contains(&steps) {
-            return Err(Refusal::Wrong(format!("control_steps: {steps}: expected 1 to {MAX_STEPS}")));
+            return Err(HttpRefusal::Wrong(format!("control_steps: {steps}: expected 1 to {MAX_STEPS}")));
         }
         who.protocol.control_steps = steps;
         let seen = self.shown.seen(&who, images)?;
-        Ok(Plan { who, seen, pace: Pace::of(self.speed.unwrap_or(1.0))? })
+        Ok(RolloutPlan { who, seen, pace: Pace::of(self.speed.unwrap_or(1.0))? })
     }
 }
 
@@ -213,7 +219,7 @@ impl SeeRequest {
     ///
     /// # Errors
     /// Returns an error if the request is invalid.
-    pub fn seen(self, catalogue: &Catalogue, images: &ImageSets) -> Result<Seen, Refusal> {
+    pub fn seen(self, catalogue: &RobotCatalogue, images: &ImageSets) -> Result<SeenPixels, HttpRefusal> {
         let who = self.subject.find(catalogue)?;
         self.shown.seen(&who, images)
     }
@@ -223,8 +229,8 @@ impl SeeRequest {
 ///
 /// # Errors
 /// Returns an error, with the key, if the request is invalid.
-pub fn read<T: serde::de::DeserializeOwned>(body: &[u8]) -> Result<T, Refusal> {
+pub fn read<T: serde::de::DeserializeOwned>(body: &[u8]) -> Result<T, HttpRefusal> {
     let text =
-        std::str::from_utf8(body).map_err(|_| Refusal::Wrong("request: not UTF-8 text".to_string()))?;
-    crate::config::reading::read_json(text, "request").map_err(Refusal::from)
+        std::str::from_utf8(body).map_err(|_| HttpRefusal::Wrong("request: not UTF-8 text".to_string()))?;
+    crate::config::reading::read_json(text, "request").map_err(HttpRefusal::from)
 }

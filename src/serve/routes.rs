@@ -3,9 +3,9 @@
 use crate::body::Body;
 use crate::draw::html::materials;
 use crate::serve::assets::asset;
-use crate::serve::http::{Request, Response};
-use crate::serve::refusal::Refusal;
-use crate::serve::request::{ChangeRequest, Pace, Plan, SeeRequest, SimulationRequest};
+use crate::serve::http::{HttpResponse, Request};
+use crate::serve::refusal::HttpRefusal;
+use crate::serve::request::{ChangeRequest, Pace, RolloutPlan, SeeRequest, SimulationRequest};
 use crate::serve::team::{TeamPlan, TeamRequest};
 use crate::serve::{Service, request, team};
 use serde::Deserialize;
@@ -14,9 +14,9 @@ use serde_json::json;
 /// The reaction to a request.
 pub enum Reply {
     /// Sends a complete response.
-    Whole(Response),
+    Whole(HttpResponse),
     /// Begins a simulation.
-    Simulation(Box<Plan>),
+    Simulation(Box<RolloutPlan>),
     /// Begins a team's walk.
     Team(Box<TeamPlan>),
 }
@@ -29,21 +29,22 @@ pub fn reply(service: &Service, request: &Request) -> Reply {
     let parts: Vec<&str> = request.path.split('/').skip(1).collect();
     let get = matches!(request.method.as_str(), "GET" | "HEAD");
     let post = request.method == "POST";
-    let reading = |answer: &dyn Fn() -> Result<Response, Refusal>| {
-        let answer = if get { answer().unwrap_or_else(refused) } else { Response::wrong_method("GET, HEAD") };
+    let reading = |answer: &dyn Fn() -> Result<HttpResponse, HttpRefusal>| {
+        let answer =
+            if get { answer().unwrap_or_else(refused) } else { HttpResponse::wrong_method("GET, HEAD") };
         Reply::Whole(answer)
     };
-    let posting = |answer: &dyn Fn() -> Result<Response, Refusal>| {
-        let answer = if post { answer().unwrap_or_else(refused) } else { Response::wrong_method("POST") };
+    let posting = |answer: &dyn Fn() -> Result<HttpResponse, HttpRefusal>| {
+        let answer = if post { answer().unwrap_or_else(refused) } else { HttpResponse::wrong_method("POST") };
         Reply::Whole(answer)
     };
     match parts.as_slice() {
-        ["api", "status"] => reading(&|| Ok(Response::json(&service.status()))),
-        ["api", "materials"] => reading(&|| Ok(Response::json(&materials()))),
-        ["api", "archives"] => reading(&|| Ok(Response::json(&service.catalogue.list()))),
+        ["api", "status"] => reading(&|| Ok(HttpResponse::json(&service.status()))),
+        ["api", "materials"] => reading(&|| Ok(HttpResponse::json(&materials()))),
+        ["api", "archives"] => reading(&|| Ok(HttpResponse::json(&service.catalogue.list()))),
         ["api", "archives", index] => reading(&|| archive(service, index)),
         ["api", "archives", index, "progress"] => {
-            reading(&|| Ok(Response::json(&service.catalogue.course(number(index, "archive")?)?)))
+            reading(&|| Ok(HttpResponse::json(&service.catalogue.course(number(index, "archive")?)?)))
         }
         ["api", "images"] => reading(&|| images(service, request)),
         ["api", "body"] => posting(&|| {
@@ -53,17 +54,17 @@ pub fn reply(service: &Service, request: &Request) -> Reply {
                 body: Body,
             }
             let Posted { body } = request::read(&request.body)?;
-            Ok(Response::json(&service.check(&body)))
+            Ok(HttpResponse::json(&service.check(&body)))
         }),
         ["api", "stimulus"] => posting(&|| {
             let asked: SeeRequest = request::read(&request.body)?;
             let seen = asked.seen(&service.catalogue, &service.images)?;
-            Ok(Response::json(&json!({ "stimulus": seen.stimulus, "label": seen.label })))
+            Ok(HttpResponse::json(&json!({ "stimulus": seen.stimulus, "label": seen.label })))
         }),
         ["api", "scenario"] => posting(&|| {
             let text = std::str::from_utf8(&request.body);
-            let text = text.map_err(|_| Refusal::Wrong("scenario: not UTF-8 text".to_string()))?;
-            Ok(Response::json(&service.load(text)?))
+            let text = text.map_err(|_| HttpRefusal::Wrong("scenario: not UTF-8 text".to_string()))?;
+            Ok(HttpResponse::json(&service.load(text)?))
         }),
         ["api", "simulations"] if post => {
             let plan =
@@ -81,35 +82,35 @@ pub fn reply(service: &Service, request: &Request) -> Reply {
         ["api", "team"] => reading(&|| {
             let members = team::members(&service.catalogue.collections());
             let classes = team::classes(members.iter().map(|member| &member.judge));
-            Ok(Response::json(&json!({ "members": members, "classes": classes })))
+            Ok(HttpResponse::json(&json!({ "members": members, "classes": classes })))
         }),
-        ["api", "simulations"] => Reply::Whole(Response::wrong_method("POST")),
+        ["api", "simulations"] => Reply::Whole(HttpResponse::wrong_method("POST")),
         ["api", "simulations", id] => posting(&|| change(service, id, &request.body)),
         _ => match asset(&request.path) {
-            Some(_) if !get => Reply::Whole(Response::wrong_method("GET, HEAD")),
+            Some(_) if !get => Reply::Whole(HttpResponse::wrong_method("GET, HEAD")),
             Some(file) => Reply::Whole(file),
-            None => Reply::Whole(Response::refusal(404, "there is nothing here; the page is at /")),
+            None => Reply::Whole(HttpResponse::refusal(404, "there is nothing here; the page is at /")),
         },
     }
 }
 
 /// Converts a refusal to an HTTP response.
-pub fn refused(refusal: Refusal) -> Response {
+pub fn refused(refusal: HttpRefusal) -> HttpResponse {
     let status = match refusal {
-        Refusal::Wrong(_) => 400,
-        Refusal::Unknown(_) => 404,
-        Refusal::Busy(_) => 503,
+        HttpRefusal::Wrong(_) => 400,
+        HttpRefusal::Unknown(_) => 404,
+        HttpRefusal::Busy(_) => 503,
     };
-    Response::refusal(status, &refusal.to_string())
+    HttpResponse::refusal(status, &refusal.to_string())
 }
 
-fn number<T: std::str::FromStr>(text: &str, what: &str) -> Result<T, Refusal> {
-    text.parse().map_err(|_| Refusal::Wrong(format!("{what}: {text:?}: expected a number")))
+fn number<T: std::str::FromStr>(text: &str, what: &str) -> Result<T, HttpRefusal> {
+    text.parse().map_err(|_| HttpRefusal::Wrong(format!("{what}: {text:?}: expected a number")))
 }
 
-fn archive(service: &Service, index: &str) -> Result<Response, Refusal> {
+fn archive(service: &Service, index: &str) -> Result<HttpResponse, HttpRefusal> {
     let collection = service.catalogue.collection(number(index, "archive")?)?;
-    Ok(Response::json(&json!({
+    Ok(HttpResponse::json(&json!({
         "name": collection.name,
         "bins": collection.bins,
         "tasks": collection.tasks,
@@ -119,20 +120,20 @@ fn archive(service: &Service, index: &str) -> Result<Response, Refusal> {
     })))
 }
 
-fn images(service: &Service, request: &Request) -> Result<Response, Refusal> {
+fn images(service: &Service, request: &Request) -> Result<HttpResponse, HttpRefusal> {
     let Some(set) = request.asked("set") else {
-        return Ok(Response::json(&service.images.list()));
+        return Ok(HttpResponse::json(&service.images.list()));
     };
     let or = |key: &str, default: usize| request.asked(key).map_or(Ok(default), |text| number(text, key));
     let class = request.asked("class").map_or(Ok(0), |text| number(text, "class"))?;
     let page = service.images.page(set, class, or("from", 0)?, or("count", 24)?)?;
-    Ok(Response::json(&page))
+    Ok(HttpResponse::json(&page))
 }
 
-fn change(service: &Service, id: &str, body: &[u8]) -> Result<Response, Refusal> {
+fn change(service: &Service, id: &str, body: &[u8]) -> Result<HttpResponse, HttpRefusal> {
     let simulation = service.simulations.simulation(number(id, "simulation")?)?;
     let ChangeRequest { shown, speed, paused } = request::read(body)?;
     let seen = shown.map(|shown| shown.seen(&simulation.who, &service.images)).transpose()?;
     simulation.change(speed.map(Pace::of).transpose()?, paused, seen);
-    Ok(Response::done())
+    Ok(HttpResponse::done())
 }

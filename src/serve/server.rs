@@ -4,7 +4,7 @@ use crate::base::error::Error;
 use crate::base::remedy::Remedy;
 use crate::base::threads;
 use crate::serve::catalogue::Who;
-use crate::serve::http::Response;
+use crate::serve::http::HttpResponse;
 use crate::serve::routes::Reply;
 use crate::serve::simulation::{Gone, live};
 use crate::serve::simulations::{Control, Slot};
@@ -88,7 +88,7 @@ fn accept(listener: &TcpListener, service: &Arc<Service>, ended: &AtomicBool) {
         };
         if connections.fetch_add(1, Ordering::AcqRel) >= MAX_CONNECTIONS {
             connections.fetch_sub(1, Ordering::AcqRel);
-            let busy = Response::refusal(503, "too many connections at once");
+            let busy = HttpResponse::refusal(503, "too many connections at once");
             let _ = stream.set_write_timeout(Some(LOOK)).and_then(|()| busy.send(&mut stream, false));
             continue;
         }
@@ -147,13 +147,13 @@ fn simulation(
     who: &Who,
     lives: impl FnOnce(&Slot, &mut Tell) -> Result<(), Gone>,
     stream: &mut TcpStream,
-) -> Option<Response> {
+) -> Option<HttpResponse> {
     let slot = match service.simulations.begin(who.clone()) {
         Ok(slot) => slot,
         Err(refusal) => return Some(routes::refused(refusal)),
     };
     if let Err(error) = end_with(stream, &slot.control) {
-        return Some(Response::refusal(503, &error.to_string()));
+        return Some(HttpResponse::refusal(503, &error.to_string()));
     }
     let begun = http::begin_events(stream).map_err(|_| Gone);
     let told = begun

@@ -1,6 +1,6 @@
 //! Runs one simulation at the requested pace and reports every moment.
 
-use crate::serve::request::{MAX_STEPS, Pace, Plan, Seen};
+use crate::serve::request::{MAX_STEPS, Pace, RolloutPlan, SeenPixels};
 use crate::serve::simulations::{Control, Slot};
 use crate::sim::{StepError, System};
 use crate::task::answer::{Reading, answer};
@@ -29,7 +29,7 @@ pub enum Event<'a> {
         /// The number of the simulation.
         id: u64,
         /// The robot, its image and the durations.
-        plan: &'a Plan,
+        plan: &'a RolloutPlan,
         /// The voxels with their corners.
         voxels: Vec<VoxelCorners>,
         /// The initial pose.
@@ -42,7 +42,7 @@ pub enum Event<'a> {
         /// The last control step with this image.
         until: u32,
         /// The image.
-        seen: &'a Seen,
+        seen: &'a SeenPixels,
     },
     /// The simulation advanced.
     Moments {
@@ -74,7 +74,11 @@ pub struct Gone;
 ///
 /// # Errors
 /// Returns [`Gone`] as soon as `tell` does.
-pub fn live(slot: &Slot, plan: &Plan, mut tell: impl FnMut(Event) -> Result<(), Gone>) -> Result<(), Gone> {
+pub fn live(
+    slot: &Slot,
+    plan: &RolloutPlan,
+    mut tell: impl FnMut(Event) -> Result<(), Gone>,
+) -> Result<(), Gone> {
     let who = &plan.who;
     let judge = who.judge.as_ref();
     let system = Arc::new(System::new(&who.body, who.physics.clone()));
@@ -202,8 +206,8 @@ mod tests {
             encoding: StimulusParams::default(),
             judge: None,
         };
-        let seen = Seen { stimulus: Grid::filled(2, 4, 0.0), label: None };
-        let plan = Plan { who: who.clone(), seen, pace: Pace::Free };
+        let seen = SeenPixels { stimulus: Grid::filled(2, 4, 0.0), label: None };
+        let plan = RolloutPlan { who: who.clone(), seen, pace: Pace::Free };
         let simulations = Simulations::default();
         let slot = simulations.begin(who).unwrap();
         let begin = Instant::now();

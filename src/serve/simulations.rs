@@ -1,8 +1,8 @@
 //! [`Simulations`]: the running simulations and their controls.
 
 use crate::serve::catalogue::Who;
-use crate::serve::refusal::Refusal;
-use crate::serve::request::{Pace, Seen};
+use crate::serve::refusal::HttpRefusal;
+use crate::serve::request::{Pace, SeenPixels};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -21,7 +21,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 struct Wishes {
     pace: Option<Pace>,
     paused: Option<bool>,
-    seen: Option<Seen>,
+    seen: Option<SeenPixels>,
 }
 
 /// The control of a simulation in another thread.
@@ -39,13 +39,13 @@ pub struct Control {
 pub(crate) struct News {
     pub pace: Option<Pace>,
     pub paused: Option<bool>,
-    pub seen: Option<Seen>,
+    pub seen: Option<SeenPixels>,
     pub end: bool,
 }
 
 impl Control {
     /// Requests a change.
-    pub fn change(&self, pace: Option<Pace>, paused: Option<bool>, seen: Option<Seen>) {
+    pub fn change(&self, pace: Option<Pace>, paused: Option<bool>, seen: Option<SeenPixels>) {
         let mut wishes = lock(&self.wishes);
         wishes.pace = pace.or(wishes.pace);
         wishes.paused = paused.or(wishes.paused);
@@ -115,12 +115,12 @@ impl Simulations {
     ///
     /// # Errors
     /// Returns an error if all slots are taken.
-    pub fn begin(&self, who: Who) -> Result<Slot<'_>, Refusal> {
+    pub fn begin(&self, who: Who) -> Result<Slot<'_>, HttpRefusal> {
         let mut running = lock(&self.running);
         if running.closed || running.simulations.len() >= MAX_SIMULATIONS {
             let text =
                 format!("{MAX_SIMULATIONS} simulations are running, the most at once; close a tab or wait");
-            return Err(Refusal::Busy(text));
+            return Err(HttpRefusal::Busy(text));
         }
         running.begun += 1;
         let id = running.begun;
@@ -138,9 +138,10 @@ impl Simulations {
     ///
     /// # Errors
     /// Returns an error if no simulation has that number (any more).
-    pub fn simulation(&self, id: u64) -> Result<Arc<Control>, Refusal> {
+    pub fn simulation(&self, id: u64) -> Result<Arc<Control>, HttpRefusal> {
         let found = lock(&self.running).simulations.get(&id).cloned();
-        found.ok_or_else(|| Refusal::Unknown(format!("there is no simulation {id}; perhaps it has ended")))
+        found
+            .ok_or_else(|| HttpRefusal::Unknown(format!("there is no simulation {id}; perhaps it has ended")))
     }
 
     /// Returns the number of running simulations.

@@ -5,7 +5,7 @@
 
 use crate::draw::html::{STEPS, corners, quantised};
 use crate::serve::catalogue::Who;
-use crate::serve::request::{Plan, Seen};
+use crate::serve::request::{RolloutPlan, SeenPixels};
 use crate::serve::simulation::{Event, STEPS_PER_SECOND};
 use crate::serve::team::{Name, TeamEvent};
 use crate::task::answer::THRESHOLD;
@@ -35,16 +35,18 @@ pub fn text(event: &Event) -> String {
 pub fn of_team(event: &TeamEvent) -> String {
     let (name, data) = match event {
         TeamEvent::Begin { id, plan, classes, stands } => {
-            let member =
-                |((name, who, _), (voxels, frame)): (&(Name, Who, Seen), &(Vec<VoxelCorners>, Frame))| {
-                    json!({
-                        "name": name,
-                        "body": who.body.to_string(),
-                        "voxels": corners(&who.body, voxels),
-                        "points": frame.points.len(),
-                        "frames": positions(std::slice::from_ref(frame)),
-                    })
-                };
+            let member = |((name, who, _), (voxels, frame)): (
+                &(Name, Who, SeenPixels),
+                &(Vec<VoxelCorners>, Frame),
+            )| {
+                json!({
+                    "name": name,
+                    "body": who.body.to_string(),
+                    "voxels": corners(&who.body, voxels),
+                    "points": frame.points.len(),
+                    "frames": positions(std::slice::from_ref(frame)),
+                })
+            };
             let members: Vec<Value> = plan.members.iter().zip(stands).map(member).collect();
             let seen = looks(0, plan.control_steps, &plan.together);
             let words = json!({
@@ -65,7 +67,7 @@ pub fn of_team(event: &TeamEvent) -> String {
     format!("event: {name}\ndata: {data}\n\n")
 }
 
-fn begin(id: u64, plan: &Plan, voxels: &[VoxelCorners], frame: &Frame) -> Value {
+fn begin(id: u64, plan: &RolloutPlan, voxels: &[VoxelCorners], frame: &Frame) -> Value {
     let body = &plan.who.body;
     json!({
         "id": id,
@@ -82,7 +84,7 @@ fn begin(id: u64, plan: &Plan, voxels: &[VoxelCorners], frame: &Frame) -> Value 
     })
 }
 
-fn looks(step: u32, until: u32, seen: &Seen) -> Value {
+fn looks(step: u32, until: u32, seen: &SeenPixels) -> Value {
     json!({ "step": step, "until": until, "label": seen.label, "stimulus": seen.stimulus })
 }
 

@@ -1,10 +1,10 @@
 //! A team: robots of several tasks walk under one image at once, while their votes are counted.
 
 use crate::analysis::votes::{CLIP, Tally};
-use crate::serve::catalogue::{Catalogue, Collection, Who};
+use crate::serve::catalogue::{Collection, RobotCatalogue, Who};
 use crate::serve::images::ImageSets;
-use crate::serve::refusal::Refusal;
-use crate::serve::request::{MAX_STEPS, Pace, Seen, Shown};
+use crate::serve::refusal::HttpRefusal;
+use crate::serve::request::{ImageChoice, MAX_STEPS, Pace, SeenPixels};
 use crate::serve::simulation::{Clock, Gone, HEARTBEAT};
 use crate::serve::simulations::Slot;
 use crate::sim::{StepError, System};
@@ -84,7 +84,7 @@ pub fn classes<'a>(judges: impl IntoIterator<Item = &'a Readout>) -> Vec<u8> {
 pub struct TeamRequest {
     /// The image.
     #[serde(default)]
-    shown: Shown,
+    shown: ImageChoice,
     /// The number of control steps; the default is the first robot's protocol.
     control_steps: Option<u32>,
     /// The speed as a multiple of real time; 0: as fast as possible. Default 1.
@@ -95,9 +95,9 @@ pub struct TeamRequest {
 #[derive(Clone, Debug)]
 pub struct TeamPlan {
     /// The robots with their stimuli; at least two.
-    pub members: Vec<(Name, Who, Seen)>,
+    pub members: Vec<(Name, Who, SeenPixels)>,
     /// The common stimulus that covers all windows.
-    pub together: Seen,
+    pub together: SeenPixels,
     /// The number of control steps.
     pub control_steps: u32,
     /// The pace.
@@ -109,7 +109,7 @@ impl TeamRequest {
     ///
     /// # Errors
     /// Returns an error if the request is invalid.
-    pub fn plan(self, catalogue: &Catalogue, images: &ImageSets) -> Result<TeamPlan, Refusal> {
+    pub fn plan(self, catalogue: &RobotCatalogue, images: &ImageSets) -> Result<TeamPlan, HttpRefusal> {
         let collections = catalogue.collections();
         let names = members(&collections);
         let mut members = Vec::new();
@@ -124,7 +124,9 @@ impl TeamRequest {
         let together = self.shown.seen(&Who { encoding, ..first.clone() }, images)?;
         let control_steps = self.control_steps.unwrap_or(first.protocol.control_steps.min(MAX_STEPS));
         if !(1..=MAX_STEPS).contains(&control_steps) {
-            return Err(Refusal::Wrong(format!("control_steps: {control_steps}: expected 1 to {MAX_STEPS}")));
+            return Err(HttpRefusal::Wrong(format!(
+                "control_steps: {control_steps}: expected 1 to {MAX_STEPS}"
+            )));
         }
         Ok(TeamPlan { members, together, control_steps, pace: Pace::of(self.speed.unwrap_or(1.0))? })
     }
@@ -262,8 +264,10 @@ mod tests {
                 encoding: StimulusParams::default(),
                 judge: Some(judge.clone()),
             };
-            let seen =
-                Seen { stimulus: Grid::filled(who.body.height(), who.body.width(), 1.0), label: Some(1) };
+            let seen = SeenPixels {
+                stimulus: Grid::filled(who.body.height(), who.body.width(), 1.0),
+                label: Some(1),
+            };
             (Name { archive: 0, robot: body.to_string(), task: String::new(), judge }, who, seen)
         };
         let members = vec![member("3434/4345/6363", judge(0, 1)), member("334/463/343", judge(1, 2))];
@@ -293,7 +297,7 @@ mod tests {
         .unwrap();
         let (step, tally) = end.unwrap();
         assert!((step, moments > 3) == (120, true));
-        let alone = |(_, who, seen): &(Name, Who, Seen)| {
+        let alone = |(_, who, seen): &(Name, Who, SeenPixels)| {
             let system = Arc::new(System::new(&who.body, who.physics.clone()));
             fresh_rollout(&system, &who.protocol, &seen.stimulus, &AtomicBool::new(false)).ok()
         };

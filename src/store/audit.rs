@@ -12,7 +12,7 @@ use crate::store::folder;
 use crate::store::names::AUDIT_JSON;
 use crate::store::results::{self, Stored, by_lines, write_with_table};
 use crate::store::run::RunFile;
-use crate::task::perturbation::Kind;
+use crate::task::perturbation::PerturbationKind;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -333,7 +333,7 @@ pub struct PerturbedRollout {
     /// The change and its size.
     pub name: String,
     /// The kind of the change.
-    pub kind: Kind,
+    pub kind: PerturbationKind,
     /// The displacement under each training image, voxel lengths (mirrored back if the rollout is
     /// mirrored); null if unstable.
     #[serde(default, deserialize_with = "ranges::number")]

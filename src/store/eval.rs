@@ -12,7 +12,7 @@ use crate::data::dataset::Dataset;
 use crate::store::images::{DatasetRef, HeldOut, ImageRef};
 use crate::store::results::{self, Stored};
 use crate::store::run::RunFile;
-use crate::store::setting::{RunRef, Setting};
+use crate::store::setting::{RunRef, RunSetting};
 use crate::store::stored_run::StoredRun;
 use crate::store::validation::Validated;
 use crate::task::answer::Direction;
@@ -50,7 +50,7 @@ pub struct EvalFile {
     pub runs: Vec<RunRef>,
     /// The task, data and stimulus; if robots use different windows, those of the common part.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub setting: Option<Setting>,
+    pub setting: Option<RunSetting>,
     /// The selection of the robots, in words.
     pub selected: String,
     /// The name of the dataset.
@@ -180,7 +180,7 @@ impl Stored for EvalFile {
     const FORMAT: (&'static str, u32) = (FORMAT, FORMAT_VERSION);
 
     fn check(&self) -> Result<(), Error> {
-        self.setting.as_ref().map_or(Ok(()), Setting::check)?;
+        self.setting.as_ref().map_or(Ok(()), RunSetting::check)?;
         if self.images.is_empty() {
             return Err(Error::at_key("images", "expected one or more"));
         }
@@ -254,10 +254,10 @@ impl EvalFile {
             run: first.map_or(String::new(), |run| run.name.clone()),
             run_seed: first.map_or(0, |run| run.config.seed),
             runs: sources.iter().map(RunRef::of).collect(),
-            setting: first.map(|run| Setting {
+            setting: first.map(|run| RunSetting {
                 stimulus: together.stimulus,
                 task: together.task.clone(),
-                ..Setting::new(run)
+                ..RunSetting::new(run)
             }),
             selected,
             dataset: first.map_or(String::new(), |run| run.dataset.name.clone()),

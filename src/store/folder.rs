@@ -58,7 +58,7 @@ pub struct RunFolder {
 
 /// Returns true if a process is working on the run in a folder.
 pub fn is_in_use(folder: &Path) -> bool {
-    matches!(lock::state(&folder.join(LOCK)), Ok(lock::State::Held(_)))
+    matches!(lock::state(&folder.join(LOCK)), Ok(lock::LockState::Held(_)))
 }
 
 impl RunFolder {

@@ -59,7 +59,7 @@ impl std::fmt::Display for Holder {
 
 /// The state of a lock file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum State {
+pub enum LockState {
     /// No process holds it.
     Free,
     /// A process holds it, with its name if the file contains it.
@@ -73,7 +73,7 @@ pub enum State {
 
 /// A reason why a lock was not taken.
 #[derive(Debug)]
-pub enum Refusal {
+pub enum LockRefusal {
     /// Another process holds it, with its name if the file contains it.
     Held(Option<Holder>),
     /// A stop signal ended the wait.
@@ -84,29 +84,29 @@ pub enum Refusal {
     NoThread(Error),
 }
 
-impl From<io::Error> for Refusal {
+impl From<io::Error> for LockRefusal {
     fn from(error: io::Error) -> Self {
-        Refusal::Io(error)
+        LockRefusal::Io(error)
     }
 }
 
-impl From<Stopped> for Refusal {
+impl From<Stopped> for LockRefusal {
     fn from(_: Stopped) -> Self {
-        Refusal::Stopped
+        LockRefusal::Stopped
     }
 }
 
-impl Refusal {
+impl LockRefusal {
     /// Converts to an error for the user: `held` describes the other process, `advice` the remedy.
     pub fn into_error(self, path: &Path, held: &str, advice: &str) -> Error {
         match self {
-            Refusal::Held(holder) => {
+            LockRefusal::Held(holder) => {
                 let by = holder.map_or(String::new(), |holder| format!(" ({holder})"));
                 Error::occupied(format!("{held}{by}")).advice(advice)
             }
-            Refusal::Stopped => Stopped.into(),
-            Refusal::Io(error) => Error::writing(path, &error),
-            Refusal::NoThread(error) => error,
+            LockRefusal::Stopped => Stopped.into(),
+            LockRefusal::Io(error) => Error::writing(path, &error),
+            LockRefusal::NoThread(error) => error,
         }
     }
 }
@@ -142,7 +142,7 @@ impl Lock {
     ///
     /// # Errors
     /// If another process has it; if it is stopped while it waits; what the system says.
-    pub fn take(path: &Path, session: &Session) -> Result<Self, Refusal> {
+    pub fn take(path: &Path, session: &Session) -> Result<Self, LockRefusal> {
         Lock::take_in(path, DEFAULT, session)
     }
 
@@ -152,11 +152,11 @@ impl Lock {
     ///
     /// # Errors
     /// As [`Lock::take`].
-    pub fn take_contended(path: &Path, session: &Session) -> Result<Self, Refusal> {
+    pub fn take_contended(path: &Path, session: &Session) -> Result<Self, LockRefusal> {
         Lock::take_in(path, LockPolicy { is_contended: true, ..DEFAULT }, session)
     }
 
-    fn take_in(path: &Path, policy: LockPolicy, session: &Session) -> Result<Self, Refusal> {
+    fn take_in(path: &Path, policy: LockPolicy, session: &Session) -> Result<Self, LockRefusal> {
         let file = File::options().create(true).truncate(false).read(true).write(true).open(path)?;
         let is_locked = lock(&file, policy)?;
         let host = gethostname().to_string_lossy().into_owned();
@@ -168,7 +168,7 @@ impl Lock {
                 let text = format!("{before} was at work here: waiting up to {seconds} s for a sign of life");
                 session.observer.note(&format!("{}: {text}", path.display()));
                 if is_alive(path, &before, policy.dead_after, session)? {
-                    return Err(Refusal::Held(read(path)?));
+                    return Err(LockRefusal::Held(read(path)?));
                 }
             }
         }
@@ -178,7 +178,7 @@ impl Lock {
             // If two processes found it free at once, the one whose name remains has it.
             std::thread::sleep(LOOK);
             if read(path)?.as_ref() != Some(&own) {
-                return Err(Refusal::Held(read(path)?));
+                return Err(LockRefusal::Held(read(path)?));
             }
         }
         let own = Arc::new(Own::new(path, own));
@@ -188,7 +188,7 @@ impl Lock {
         });
         let mut lock = Lock { own: Arc::clone(&own), heart: None, _ownership: ownership, _file: file };
         let heart = threads::start("heartbeat", move || own.beat(policy.beat));
-        lock.heart = Some(heart.map_err(Refusal::NoThread)?);
+        lock.heart = Some(heart.map_err(LockRefusal::NoThread)?);
         Ok(lock)
     }
 }
@@ -284,19 +284,19 @@ fn now() -> u64 {
 
 /// Returns the states of lock files. It watches hearts that are silent by this machine's clock
 /// slightly longer than a heartbeat, all at once.
-pub fn states(paths: &[PathBuf]) -> Vec<State> {
+pub fn states(paths: &[PathBuf]) -> Vec<LockState> {
     // An unreadable file gives no information.
-    let mut all: Vec<State> = paths.iter().map(|path| state(path).unwrap_or(State::Free)).collect();
+    let mut all: Vec<LockState> = paths.iter().map(|path| state(path).unwrap_or(LockState::Free)).collect();
     let began = Instant::now();
-    while all.iter().any(|state| matches!(state, State::Silent(_))) {
+    while all.iter().any(|state| matches!(state, LockState::Silent(_))) {
         let is_over = began.elapsed() > BEAT + 2 * LOOK;
         std::thread::sleep(if is_over { Duration::ZERO } else { LOOK });
         for (path, state) in paths.iter().zip(&mut all) {
-            let State::Silent(before) = state else { continue };
+            let LockState::Silent(before) = state else { continue };
             match read(path) {
-                Ok(None) => *state = State::Free,
-                Ok(Some(now)) if now != *before => *state = State::Held(Some(now)),
-                _ if is_over => *state = State::Stale(before.clone()),
+                Ok(None) => *state = LockState::Free,
+                Ok(Some(now)) if now != *before => *state = LockState::Held(Some(now)),
+                _ if is_over => *state = LockState::Stale(before.clone()),
                 _ => {}
             }
         }
@@ -309,10 +309,10 @@ pub fn states(paths: &[PathBuf]) -> Vec<State> {
 ///
 /// # Errors
 /// Returns the system's error.
-pub fn state(path: &Path) -> io::Result<State> {
+pub fn state(path: &Path) -> io::Result<LockState> {
     use io::ErrorKind::{NotFound, PermissionDenied, ReadOnlyFilesystem};
     let file = match File::options().read(true).write(true).open(path) {
-        Err(error) if error.kind() == NotFound => return Ok(State::Free),
+        Err(error) if error.kind() == NotFound => return Ok(LockState::Free),
         // Other users may check, too, and from any machine.
         Err(error) if [PermissionDenied, ReadOnlyFilesystem].contains(&error.kind()) => File::open(path)?,
         opened => opened?,
@@ -324,23 +324,23 @@ pub fn state(path: &Path) -> io::Result<State> {
     };
     let holder = read(path)?;
     if is_locked == Some(true) {
-        return Ok(State::Held(holder));
+        return Ok(LockState::Held(holder));
     }
-    let Some(holder) = holder else { return Ok(State::Free) };
+    let Some(holder) = holder else { return Ok(LockState::Free) };
     let is_here = holder.host == gethostname().to_string_lossy();
     let beaten = file.metadata()?.modified()?;
     // If the other machine's clock is ahead, no time has passed.
     let silent = SystemTime::now().duration_since(beaten).unwrap_or_default();
     let has_ended = silent > LONG_DEAD || is_here && is_locked == Some(false);
     Ok(match () {
-        () if has_ended => State::Stale(holder),
-        () if silent > DEAD_AFTER + BEAT => State::Silent(holder),
-        () => State::Held(Some(holder)),
+        () if has_ended => LockState::Stale(holder),
+        () if silent > DEAD_AFTER + BEAT => LockState::Silent(holder),
+        () => LockState::Held(Some(holder)),
     })
 }
 
 /// Takes the system's lock; returns true if the system has locks.
-fn lock(file: &File, policy: LockPolicy) -> Result<bool, Refusal> {
+fn lock(file: &File, policy: LockPolicy) -> Result<bool, LockRefusal> {
     if !policy.by_system {
         return Ok(false);
     }
@@ -355,7 +355,7 @@ fn lock(file: &File, policy: LockPolicy) -> Result<bool, Refusal> {
     let mut file = file;
     file.seek(SeekFrom::Start(0))?;
     file.read_to_string(&mut text)?;
-    Err(Refusal::Held(serde_json::from_str(&text).ok()))
+    Err(LockRefusal::Held(serde_json::from_str(&text).ok()))
 }
 
 /// Reads the holder in a lock file; invalid text, as after a power cut, gives `None`.
@@ -376,7 +376,12 @@ fn write(path: &Path, holder: &Holder) -> io::Result<()> {
 ///
 /// # Errors
 /// If it is stopped before it knows; what the system says.
-fn is_alive(path: &Path, before: &Holder, dead_after: Duration, session: &Session) -> Result<bool, Refusal> {
+fn is_alive(
+    path: &Path,
+    before: &Holder,
+    dead_after: Duration,
+    session: &Session,
+) -> Result<bool, LockRefusal> {
     let began = Instant::now();
     while began.elapsed() < dead_after {
         session.check()?;
@@ -429,12 +434,13 @@ mod tests {
         for policy in [DEFAULT, WITHOUT] {
             assert_eq!(read(&path).ok().flatten(), None);
             let lock = Lock::take_in(&path, policy, &Session::default()).unwrap();
-            let Err(Refusal::Held(Some(holder))) = Lock::take_in(&path, policy, &Session::default()) else {
+            let Err(LockRefusal::Held(Some(holder))) = Lock::take_in(&path, policy, &Session::default())
+            else {
                 panic!("{policy:?}: taken twice")
             };
             assert_eq!((holder.process, &holder.host), (std::process::id(), &lock.own.host));
             drop(lock);
-            assert_eq!(state(&path).unwrap(), State::Free);
+            assert_eq!(state(&path).unwrap(), LockState::Free);
             drop(Lock::take_in(&path, policy, &Session::default()).unwrap());
         }
     }
@@ -450,7 +456,7 @@ mod tests {
         let before = read(&path).unwrap().unwrap();
         std::thread::sleep(WITHOUT.beat * 5);
         assert!(read(&path).unwrap().unwrap().beats > before.beats);
-        assert!(matches!(Lock::take_in(&path, WITHOUT, &Session::default()), Err(Refusal::Held(_))));
+        assert!(matches!(Lock::take_in(&path, WITHOUT, &Session::default()), Err(LockRefusal::Held(_))));
         drop(lock);
     }
 
@@ -472,7 +478,7 @@ mod tests {
         let stop = AtomicBool::new(false);
         let observer = Stopping(&stop, Mutex::default());
         let session = Session::new(&stop, &observer);
-        assert!(matches!(Lock::take(&path, &session), Err(Refusal::Stopped)));
+        assert!(matches!(Lock::take(&path, &session), Err(LockRefusal::Stopped)));
         let notes = observer.1.into_inner().unwrap();
         assert!(matches!(&notes[..], [note] if note.contains("process 7 on another-machine")), "{notes:?}");
         // The name stays: nobody knows yet if that process lives.
@@ -486,7 +492,7 @@ mod tests {
         let host = gethostname().to_string_lossy().into_owned();
         std::fs::write(&path, "").unwrap();
         write(&path, &Holder { host: host.clone(), process: 1, beats: 9 }).unwrap();
-        assert!(matches!(state(&path).unwrap(), State::Stale(holder) if holder.host == host));
+        assert!(matches!(state(&path).unwrap(), LockState::Stale(holder) if holder.host == host));
         let began = Instant::now();
         let _lock = Lock::take(&path, &Session::default()).unwrap();
         assert!(began.elapsed() < Duration::from_secs(5));
@@ -497,10 +503,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = path(&folder);
         elsewhere(&path);
-        assert!(matches!(state(&path).unwrap(), State::Held(Some(_))));
+        assert!(matches!(state(&path).unwrap(), LockState::Held(Some(_))));
         let long_ago = SystemTime::now() - Duration::from_secs(3601);
         File::options().write(true).open(&path).unwrap().set_modified(long_ago).unwrap();
-        assert!(matches!(state(&path).unwrap(), State::Stale(_)));
+        assert!(matches!(state(&path).unwrap(), LockState::Stale(_)));
     }
 
     #[test]
@@ -514,7 +520,7 @@ mod tests {
         for path in &paths {
             elsewhere(path);
             age(path);
-            assert!(matches!(state(path).unwrap(), State::Silent(_)));
+            assert!(matches!(state(path).unwrap(), LockState::Silent(_)));
         }
         std::thread::scope(|threads| {
             threads.spawn(|| {
@@ -524,7 +530,7 @@ mod tests {
                 age(&paths[0]);
             });
             let states = states(&paths);
-            assert!(matches!(&states[..], [State::Held(Some(_)), State::Stale(_)]), "{states:?}");
+            assert!(matches!(&states[..], [LockState::Held(Some(_)), LockState::Stale(_)]), "{states:?}");
         });
     }
 
@@ -537,7 +543,8 @@ mod tests {
                 std::thread::sleep(LOOK / 3);
                 elsewhere(&path);
             });
-            let Err(Refusal::Held(Some(holder))) = Lock::take_contended(&path, &Session::default()) else {
+            let Err(LockRefusal::Held(Some(holder))) = Lock::take_contended(&path, &Session::default())
+            else {
                 panic!("taken by two")
             };
             assert_eq!(holder.host, "another-machine");

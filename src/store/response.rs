@@ -6,7 +6,7 @@ use crate::base::ranges;
 use crate::base::session::Session;
 use crate::base::table;
 use crate::body::Body;
-use crate::response::estimate::{Estimate, Teachable};
+use crate::response::estimate::{Estimate, Trainability};
 use crate::response::gait::Gait;
 use crate::response::regression::Response;
 use crate::shipped::exists;
@@ -46,7 +46,7 @@ pub struct ResponseFile {
     /// The SHA-256 of its `run.json`.
     pub run_sha256: String,
     /// The settings of the measurement.
-    pub setting: Setting,
+    pub setting: ResponseSetting,
     /// The robots whose measurement was stopped; the same command continues them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unfinished: Vec<Unfinished>,
@@ -57,7 +57,7 @@ pub struct ResponseFile {
 /// The settings of a measurement.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Setting {
+pub struct ResponseSetting {
     /// The seed of the random images.
     pub seed: u64,
     /// The maximum number of rollouts per robot, not counting those known before.
@@ -83,10 +83,10 @@ pub struct Setting {
     pub windows: usize,
 }
 
-impl Setting {
+impl ResponseSetting {
     /// Returns true if both have the same task, dataset, stimulus and windows.
-    fn asks_as(&self, other: &Setting) -> bool {
-        let asked = |setting: &Setting| {
+    fn asks_as(&self, other: &ResponseSetting) -> bool {
+        let asked = |setting: &ResponseSetting| {
             (setting.task.clone(), setting.dataset.clone(), setting.stimulus, setting.windows)
         };
         asked(self) == asked(other)
@@ -143,10 +143,10 @@ pub struct RobotResponse {
     #[serde(deserialize_with = "ranges::number")]
     pub displacements: Vec<Option<f64>>,
     /// The soft voxels and sensors, row-major.
-    pub places: Vec<Place>,
+    pub places: Vec<ResponsePlace>,
     /// The estimate of what training could reach, if a task was named.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub taught: Option<Taught>,
+    pub taught: Option<TrainingEstimate>,
 }
 
 /// A robot whose measurement was stopped.
@@ -165,7 +165,7 @@ pub struct Unfinished {
 /// A soft voxel or a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Place {
+pub struct ResponsePlace {
     /// The row, from 0 at the top.
     pub row: usize,
     /// The column, from 0 on the left.
@@ -178,7 +178,7 @@ pub struct Place {
     pub error: f64,
 }
 
-impl Place {
+impl ResponsePlace {
     /// Returns true if the slope is within two standard errors of zero.
     pub fn is_uncertain(&self) -> bool {
         self.slope.abs() < 2.0 * self.error
@@ -188,7 +188,7 @@ impl Place {
 /// The linear model's estimate of what training a gait could reach.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Taught {
+pub struct TrainingEstimate {
     /// The mean clipped margin of its answers, `mean_clipped`: from −1 to 1.
     #[serde(deserialize_with = "ranges::number")]
     pub fitness: f64,
@@ -206,11 +206,11 @@ pub struct Taught {
     pub margin: Option<Margins>,
 }
 
-impl From<Teachable> for Taught {
-    fn from(teachable: Teachable) -> Self {
+impl From<Trainability> for TrainingEstimate {
+    fn from(teachable: Trainability) -> Self {
         let interval = |estimate: Estimate, least: f64| estimate.interval().map(|end| end.clamp(least, 1.0));
-        let Teachable { fitness, accuracy } = teachable;
-        Taught {
+        let Trainability { fitness, accuracy } = teachable;
+        TrainingEstimate {
             fitness: fitness.value,
             fitness_interval: interval(fitness, -1.0),
             accuracy: accuracy.value,
@@ -228,10 +228,10 @@ impl RobotResponse {
         response: &Response,
         displacements: Vec<Option<f64>>,
         ended_by: EndedBy,
-        taught: Option<Taught>,
+        taught: Option<TrainingEstimate>,
     ) -> Self {
         let places = gait.places().iter().zip(response.slopes.iter().zip(&response.errors));
-        let place = |(&(row, column), (&slope, &error)): (&(usize, usize), (&f64, &f64))| Place {
+        let place = |(&(row, column), (&slope, &error)): (&(usize, usize), (&f64, &f64))| ResponsePlace {
             row,
             column,
             slope,
@@ -333,7 +333,7 @@ impl ResponseFile {
     /// conditions and random images.
     fn is_of(&self, run_sha256: &str, seed: u64, conditions: &[Condition]) -> bool {
         let by_this = self.program_version == env!("CARGO_PKG_VERSION");
-        let Setting { seed: own, conditions: shown, .. } = &self.setting;
+        let ResponseSetting { seed: own, conditions: shown, .. } = &self.setting;
         self.run_sha256 == run_sha256 && by_this && *own == seed && shown == conditions
     }
 
@@ -365,7 +365,7 @@ impl ResponseFile {
     /// Encodes `response.csv`: a line per robot and place.
     pub fn to_csv(&self) -> Vec<u8> {
         let rows = self.robots.iter().flat_map(|robot| {
-            robot.places.iter().map(|Place { row, column, slope, error }| {
+            robot.places.iter().map(|ResponsePlace { row, column, slope, error }| {
                 let material = robot.body.voxels()[(*row, *column)].code();
                 (&robot.id, *row, *column, material, *slope, *error)
             })

@@ -38,7 +38,7 @@ pub struct RunRef {
 
 /// The settings that give networks the same images as the robots.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Setting {
+pub struct RunSetting {
     /// The rows and columns of a stimulus.
     pub body: BodyConfig,
     /// The classes and their groups.
@@ -65,9 +65,9 @@ impl RunRef {
     }
 }
 
-impl Setting {
+impl RunSetting {
     pub(crate) fn new(run: &RunFile) -> Self {
-        Setting {
+        RunSetting {
             body: run.config.body,
             task: run.config.task.clone(),
             data: run.config.data.clone(),

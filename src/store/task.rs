@@ -17,7 +17,7 @@ pub const FORMAT_VERSION: u32 = 1;
 /// The state of a task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum State {
+pub enum TaskState {
     /// All steps are done.
     Done,
     /// A process began it, and has not reported its end.
@@ -30,18 +30,19 @@ pub enum State {
     Waiting,
 }
 
-impl State {
+impl TaskState {
     /// All states.
-    pub const ALL: [State; 5] = [State::Done, State::Running, State::Stopped, State::Failed, State::Waiting];
+    pub const ALL: [TaskState; 5] =
+        [TaskState::Done, TaskState::Running, TaskState::Stopped, TaskState::Failed, TaskState::Waiting];
 
     /// Returns the name of the state.
     pub fn name(self) -> &'static str {
         match self {
-            State::Done => "done",
-            State::Running => "running",
-            State::Stopped => "stopped",
-            State::Failed => "failed",
-            State::Waiting => "waiting",
+            TaskState::Done => "done",
+            TaskState::Running => "running",
+            TaskState::Stopped => "stopped",
+            TaskState::Failed => "failed",
+            TaskState::Waiting => "waiting",
         }
     }
 }
@@ -61,7 +62,7 @@ pub struct TaskFile {
     /// Requests that may change: generations or challengers, validation, steps after the run.
     pub asked: Value,
     /// The state of the task.
-    pub state: State,
+    pub state: TaskState,
     /// The error of a failed task.
     pub error: Option<String>,
     /// The wall-clock time of all sessions that ended by themselves or by a signal \[s\].
@@ -77,7 +78,7 @@ impl TaskFile {
             program_version: env!("CARGO_PKG_VERSION").to_string(),
             settings,
             asked,
-            state: State::Running,
+            state: TaskState::Running,
             error: None,
             seconds: 0.0,
         }

@@ -3,7 +3,7 @@
 
 use crate::task::fitness::Fitness;
 use crate::task::fitness::Group;
-use crate::task::grouping::Split;
+use crate::task::grouping::ClassSplit;
 use serde::Serialize;
 
 /// Displacements up to this many voxel lengths are no answer (paper, "Generalization test").
@@ -19,7 +19,7 @@ pub struct Answer {
 }
 
 pub(super) fn of_split(
-    split: &Split,
+    split: &ClassSplit,
     answers: &[Answer],
 ) -> impl Iterator<Item = (Group, Option<f64>)> + Clone {
     answers.iter().filter_map(|answer| Some((split.group(answer.class)?, answer.displacement)))
@@ -65,7 +65,7 @@ pub struct Assignment {
 
 impl Assignment {
     /// Returns the assignment under which a robot's training answers are fitter (A left in a tie).
-    pub fn from_training(split: &Split, fitness: Fitness, answers: &[Answer]) -> Self {
+    pub fn from_training(split: &ClassSplit, fitness: Fitness, answers: &[Answer]) -> Self {
         let (a_right, a_left) = fitness.of_assignments(of_split(split, answers));
         Assignment { a: if a_right > a_left { Direction::Right } else { Direction::Left } }
     }
@@ -98,7 +98,7 @@ impl Assignment {
 /// in the direction of the class's group; `None` if the class is in neither group. An unstable walk
 /// (`None`) is wrong.
 pub(crate) fn is_correct(
-    split: &Split,
+    split: &ClassSplit,
     assignment: Assignment,
     class: u8,
     walk: Option<f64>,
@@ -131,7 +131,7 @@ pub struct Reading {
 impl Readout {
     /// Makes the judge of a task, given the direction of its first group; none if every class
     /// should walk the same way.
-    pub fn of(split: &Split, assignment: Assignment) -> Option<Self> {
+    pub fn of(split: &ClassSplit, assignment: Assignment) -> Option<Self> {
         if split.is_same_way() {
             return None;
         }

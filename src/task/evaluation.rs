@@ -5,7 +5,7 @@ use crate::base::session::Session;
 use crate::base::stop::Stopped;
 use crate::body::Body;
 use crate::sim::{Physics, StepError, System, Unstable, Worlds};
-use crate::task::perturbation::{Condition, Kind, Perturbation};
+use crate::task::perturbation::{Condition, Perturbation, PerturbationKind};
 use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::rollout::{Rollout, fresh_rollout, fresh_rollouts_of, same_to_sensors};
 use rayon::prelude::*;
@@ -289,7 +289,8 @@ impl<'a> Setup<'a> {
         let of = |(image, same): (usize, usize)| {
             let condition = self.condition_of[image];
             // The inverted pixel differs from image to image.
-            let is_drawn = self.conditions[condition].iter().any(|change| change.kind() == Kind::Pixel);
+            let is_drawn =
+                self.conditions[condition].iter().any(|change| change.kind() == PerturbationKind::Pixel);
             *first.entry((same, condition, is_drawn.then_some(image))).or_insert(image)
         };
         same.into_iter().enumerate().map(of).collect()
@@ -515,7 +516,7 @@ mod tests {
     use crate::base::stop::NEVER;
     use crate::body::Material;
     use crate::sim::UnstableReason;
-    use crate::task::perturbation::{Setting, Sizes, condition};
+    use crate::task::perturbation::{PerturbedSetting, Sizes, condition};
     use std::collections::BTreeSet;
 
     /// A sensor that expands at both ends: under a bright image it is wider than
@@ -767,7 +768,7 @@ mod tests {
         let protocol = Protocol { rollout: RolloutMode::Fresh, control_steps: 30, ..Protocol::default() };
         let sizes = Sizes { least_sensors: 1, ..Sizes::default() };
         for perturbation in Perturbation::all(&sizes, &body, RolloutMode::Fresh) {
-            let setting = Setting {
+            let setting = PerturbedSetting {
                 body: body.clone(),
                 physics: physics.clone(),
                 protocol: protocol.clone(),

@@ -13,12 +13,12 @@ use std::str::FromStr;
 
 /// Classes in two groups; "all the same way" is the split with an empty second group.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Split {
+pub struct ClassSplit {
     a: Vec<u8>,
     b: Vec<u8>,
 }
 
-impl Split {
+impl ClassSplit {
     /// Returns the classes of a group.
     pub fn classes(&self, group: Group) -> &[u8] {
         match group {
@@ -176,7 +176,7 @@ pub fn balanced<'a>(
 /// a robot's task is a dimension of the archive (paper, sections "Fitness" and "MAP-Elites").
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Grouping {
-    tasks: Vec<Split>,
+    tasks: Vec<ClassSplit>,
     fitness: Fitness,
 }
 
@@ -207,7 +207,7 @@ impl Grouping {
             return Err(GroupingError::EmptyGroup);
         }
         check_unique(&[a, b].concat())?;
-        let tasks = vec![Split { a: a.to_vec(), b: b.to_vec() }];
+        let tasks = vec![ClassSplit { a: a.to_vec(), b: b.to_vec() }];
         Ok(Grouping { tasks, fitness: Fitness::Min })
     }
 
@@ -232,9 +232,9 @@ impl Grouping {
         let split = |first: Vec<usize>| {
             let (a, b) = (0..k).partition::<Vec<_>, _>(|i| first.contains(i));
             let labels = |group: Vec<usize>| group.into_iter().map(|i| classes[i]).collect();
-            Split { a: labels(a), b: labels(b) }
+            ClassSplit { a: labels(a), b: labels(b) }
         };
-        let same_way = same_way_bin.then(|| Split { a: classes.to_vec(), b: Vec::new() });
+        let same_way = same_way_bin.then(|| ClassSplit { a: classes.to_vec(), b: Vec::new() });
         let tasks = firsts.into_iter().map(split).chain(same_way).collect();
         Ok(Grouping { tasks, fitness: Fitness::Min })
     }
@@ -251,13 +251,13 @@ impl Grouping {
     }
 
     /// Returns the tasks, in the order of their bins.
-    pub fn tasks(&self) -> &[Split] {
+    pub fn tasks(&self) -> &[ClassSplit] {
         &self.tasks
     }
 
     /// Returns true if "all the same way" is a task.
     pub fn has_same_way_bin(&self) -> bool {
-        self.tasks.iter().any(Split::is_same_way)
+        self.tasks.iter().any(ClassSplit::is_same_way)
     }
 
     /// Returns true if every way to split the classes is a task.
@@ -363,7 +363,7 @@ mod tests {
     }
 
     fn names(grouping: &Grouping) -> Vec<String> {
-        grouping.tasks().iter().map(Split::name).collect()
+        grouping.tasks().iter().map(ClassSplit::name).collect()
     }
 
     #[test]

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 /// The kind of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Kind {
+pub enum PerturbationKind {
     /// The robot starts above the ground, and first touches it in another way; also in another
     /// column.
     Start,
@@ -42,41 +42,41 @@ pub enum Kind {
     Pixel,
 }
 
-impl Kind {
+impl PerturbationKind {
     /// All kinds, in the order of a report.
-    pub const ALL: [Kind; 10] = [
-        Kind::Start,
-        Kind::Mirror,
-        Kind::TimeStep,
-        Kind::LengthLimits,
-        Kind::SelfContact,
-        Kind::Order,
-        Kind::Stiffness,
-        Kind::Friction,
-        Kind::Gravity,
-        Kind::Pixel,
+    pub const ALL: [PerturbationKind; 10] = [
+        PerturbationKind::Start,
+        PerturbationKind::Mirror,
+        PerturbationKind::TimeStep,
+        PerturbationKind::LengthLimits,
+        PerturbationKind::SelfContact,
+        PerturbationKind::Order,
+        PerturbationKind::Stiffness,
+        PerturbationKind::Friction,
+        PerturbationKind::Gravity,
+        PerturbationKind::Pixel,
     ];
 
     /// Returns true if it changes the simulated world. The others change only how that is computed,
     /// or how images are presented: a robot that fails under those exploits something other than
     /// body and image.
     pub fn is_of_the_world(self) -> bool {
-        self >= Kind::Stiffness
+        self >= PerturbationKind::Stiffness
     }
 
     /// Returns its name for people.
     pub fn name(self) -> &'static str {
         match self {
-            Kind::Start => "start",
-            Kind::Mirror => "ties (mirror image)",
-            Kind::TimeStep => "time step",
-            Kind::LengthLimits => "length limits",
-            Kind::SelfContact => "self-contact",
-            Kind::Order => "order of images",
-            Kind::Stiffness => "stiffness",
-            Kind::Friction => "friction",
-            Kind::Gravity => "gravity",
-            Kind::Pixel => "pixel noise",
+            PerturbationKind::Start => "start",
+            PerturbationKind::Mirror => "ties (mirror image)",
+            PerturbationKind::TimeStep => "time step",
+            PerturbationKind::LengthLimits => "length limits",
+            PerturbationKind::SelfContact => "self-contact",
+            PerturbationKind::Order => "order of images",
+            PerturbationKind::Stiffness => "stiffness",
+            PerturbationKind::Friction => "friction",
+            PerturbationKind::Gravity => "gravity",
+            PerturbationKind::Pixel => "pixel noise",
         }
     }
 }
@@ -107,7 +107,7 @@ impl Default for Sizes {
 
 /// A robot and the settings of its simulation.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Setting {
+pub struct PerturbedSetting {
     /// Its body.
     pub body: Body,
     /// The simulator's constants.
@@ -228,7 +228,7 @@ pub enum Perturbation {
 #[schemars(rename = "Perturbation")]
 struct Stored {
     /// The kind of the change.
-    kind: Kind,
+    kind: PerturbationKind,
     /// Rows, divisor of the time step, factor, speed of the limits (0: none), or number of the
     /// draw; 0.5 for the other kinds.
     amount: f64,
@@ -270,17 +270,17 @@ impl TryFrom<Stored> for Perturbation {
             false => Err(format!("amount {amount}: expected a whole number of {}", kind.name())),
         };
         Ok(match kind {
-            Kind::Start => Perturbation::Start { rows: whole()? },
-            Kind::Mirror => Perturbation::Mirror,
-            Kind::TimeStep => Perturbation::TimeStep { divisor: whole()? },
-            Kind::LengthLimits if amount == 0.0 => Perturbation::NoLengthLimits,
-            Kind::LengthLimits => Perturbation::SlowLengthLimits,
-            Kind::SelfContact => Perturbation::SelfContact,
-            Kind::Order => Perturbation::Order,
-            Kind::Stiffness => Perturbation::Stiffness { factor: amount },
-            Kind::Friction => Perturbation::Friction { factor: amount },
-            Kind::Gravity => Perturbation::Gravity { factor: amount },
-            Kind::Pixel => Perturbation::Pixel { draw: whole()?, seed },
+            PerturbationKind::Start => Perturbation::Start { rows: whole()? },
+            PerturbationKind::Mirror => Perturbation::Mirror,
+            PerturbationKind::TimeStep => Perturbation::TimeStep { divisor: whole()? },
+            PerturbationKind::LengthLimits if amount == 0.0 => Perturbation::NoLengthLimits,
+            PerturbationKind::LengthLimits => Perturbation::SlowLengthLimits,
+            PerturbationKind::SelfContact => Perturbation::SelfContact,
+            PerturbationKind::Order => Perturbation::Order,
+            PerturbationKind::Stiffness => Perturbation::Stiffness { factor: amount },
+            PerturbationKind::Friction => Perturbation::Friction { factor: amount },
+            PerturbationKind::Gravity => Perturbation::Gravity { factor: amount },
+            PerturbationKind::Pixel => Perturbation::Pixel { draw: whole()?, seed },
         })
     }
 }
@@ -292,40 +292,48 @@ impl Perturbation {
         let factors = [1.0 - sizes.share, 1.0 + sizes.share];
         let of = |kind| -> Vec<Self> {
             match kind {
-                Kind::Start => sizes.start.iter().map(|&rows| Perturbation::Start { rows }).collect(),
-                Kind::Mirror => vec![Perturbation::Mirror],
-                Kind::TimeStep => {
+                PerturbationKind::Start => {
+                    sizes.start.iter().map(|&rows| Perturbation::Start { rows }).collect()
+                }
+                PerturbationKind::Mirror => vec![Perturbation::Mirror],
+                PerturbationKind::TimeStep => {
                     sizes.time_step.iter().map(|&divisor| Perturbation::TimeStep { divisor }).collect()
                 }
-                Kind::LengthLimits => vec![Perturbation::SlowLengthLimits, Perturbation::NoLengthLimits],
-                Kind::SelfContact => vec![Perturbation::SelfContact],
-                Kind::Order if rollout == RolloutMode::Fresh => Vec::new(),
-                Kind::Order => vec![Perturbation::Order],
-                Kind::Stiffness => factors.map(|factor| Perturbation::Stiffness { factor }).to_vec(),
-                Kind::Friction => factors.map(|factor| Perturbation::Friction { factor }).to_vec(),
-                Kind::Gravity => factors.map(|factor| Perturbation::Gravity { factor }).to_vec(),
-                Kind::Pixel if !sees => Vec::new(),
-                Kind::Pixel => {
+                PerturbationKind::LengthLimits => {
+                    vec![Perturbation::SlowLengthLimits, Perturbation::NoLengthLimits]
+                }
+                PerturbationKind::SelfContact => vec![Perturbation::SelfContact],
+                PerturbationKind::Order if rollout == RolloutMode::Fresh => Vec::new(),
+                PerturbationKind::Order => vec![Perturbation::Order],
+                PerturbationKind::Stiffness => {
+                    factors.map(|factor| Perturbation::Stiffness { factor }).to_vec()
+                }
+                PerturbationKind::Friction => {
+                    factors.map(|factor| Perturbation::Friction { factor }).to_vec()
+                }
+                PerturbationKind::Gravity => factors.map(|factor| Perturbation::Gravity { factor }).to_vec(),
+                PerturbationKind::Pixel if !sees => Vec::new(),
+                PerturbationKind::Pixel => {
                     (1..=sizes.pixels).map(|draw| Perturbation::Pixel { draw, seed: sizes.seed }).collect()
                 }
             }
         };
-        Kind::ALL.into_iter().flat_map(of).collect()
+        PerturbationKind::ALL.into_iter().flat_map(of).collect()
     }
 
     /// Returns the kind of the change.
-    pub fn kind(&self) -> Kind {
+    pub fn kind(&self) -> PerturbationKind {
         match self {
-            Perturbation::Start { .. } => Kind::Start,
-            Perturbation::Mirror => Kind::Mirror,
-            Perturbation::TimeStep { .. } => Kind::TimeStep,
-            Perturbation::SlowLengthLimits | Perturbation::NoLengthLimits => Kind::LengthLimits,
-            Perturbation::SelfContact => Kind::SelfContact,
-            Perturbation::Order => Kind::Order,
-            Perturbation::Stiffness { .. } => Kind::Stiffness,
-            Perturbation::Friction { .. } => Kind::Friction,
-            Perturbation::Gravity { .. } => Kind::Gravity,
-            Perturbation::Pixel { .. } => Kind::Pixel,
+            Perturbation::Start { .. } => PerturbationKind::Start,
+            Perturbation::Mirror => PerturbationKind::Mirror,
+            Perturbation::TimeStep { .. } => PerturbationKind::TimeStep,
+            Perturbation::SlowLengthLimits | Perturbation::NoLengthLimits => PerturbationKind::LengthLimits,
+            Perturbation::SelfContact => PerturbationKind::SelfContact,
+            Perturbation::Order => PerturbationKind::Order,
+            Perturbation::Stiffness { .. } => PerturbationKind::Stiffness,
+            Perturbation::Friction { .. } => PerturbationKind::Friction,
+            Perturbation::Gravity { .. } => PerturbationKind::Gravity,
+            Perturbation::Pixel { .. } => PerturbationKind::Pixel,
         }
     }
 
@@ -358,14 +366,14 @@ impl Perturbation {
 
     /// Returns the changed setting. Compare displacements under it only after
     /// [`Perturbation::undo`].
-    pub fn apply(&self, setting: &Setting) -> Setting {
-        let Setting { body, physics, protocol, stimuli } = setting;
+    pub fn apply(&self, setting: &PerturbedSetting) -> PerturbedSetting {
+        let PerturbedSetting { body, physics, protocol, stimuli } = setting;
         let stimulus = |(image, stimulus)| self.stimulus(body, stimulus, image as u64);
         let mut stimuli: Vec<Grid<f64>> = stimuli.iter().enumerate().map(stimulus).collect();
         if *self == Perturbation::Order {
             stimuli.reverse();
         }
-        Setting {
+        PerturbedSetting {
             body: self.body(body),
             physics: self.physics(physics),
             protocol: self.protocol(protocol),
@@ -451,10 +459,10 @@ fn with_pixel_inverted(body: &Body, stimulus: &Grid<f64>, (seed, draw, image): (
 mod tests {
     use super::*;
 
-    fn setting() -> Setting {
+    fn setting() -> PerturbedSetting {
         let stimuli = vec![Grid::filled(2, 4, 0.25), Grid::filled(2, 4, 1.0)];
         let body = "3516/4442".parse().unwrap();
-        Setting { body, physics: Physics::default(), protocol: Protocol::default(), stimuli }
+        PerturbedSetting { body, physics: Physics::default(), protocol: Protocol::default(), stimuli }
     }
 
     fn all(rollout: RolloutMode) -> Vec<Perturbation> {
@@ -462,7 +470,7 @@ mod tests {
         Perturbation::all(&sizes, &setting().body, rollout)
     }
 
-    fn of(kind: Kind) -> Vec<Setting> {
+    fn of(kind: PerturbationKind) -> Vec<PerturbedSetting> {
         all(RolloutMode::Sequential)
             .iter()
             .filter(|p| p.kind() == kind)
@@ -483,27 +491,28 @@ mod tests {
             ];
             // The images of this setting are symmetric: mirroring does not change them.
             let expected = match perturbation.kind() {
-                Kind::Start => [false, false, true, false],
-                Kind::Mirror => [true, false, false, false],
-                Kind::Pixel | Kind::Order => [false, false, false, true],
+                PerturbationKind::Start => [false, false, true, false],
+                PerturbationKind::Mirror => [true, false, false, false],
+                PerturbationKind::Pixel | PerturbationKind::Order => [false, false, false, true],
                 _ => [false, true, false, false],
             };
             assert_eq!(parts, expected, "{}", perturbation.name());
             changed.physics.validate().unwrap();
         }
-        assert_eq!(of(Kind::Start)[1].protocol.start_row, 4);
-        assert_eq!(of(Kind::Gravity)[0].physics.gravity, 110.0 * 0.95);
-        assert_eq!(of(Kind::TimeStep)[1].physics.substeps, 120);
-        let [slow, far] = [&of(Kind::LengthLimits)[0].physics, &of(Kind::LengthLimits)[1].physics];
+        assert_eq!(of(PerturbationKind::Start)[1].protocol.start_row, 4);
+        assert_eq!(of(PerturbationKind::Gravity)[0].physics.gravity, 110.0 * 0.95);
+        assert_eq!(of(PerturbationKind::TimeStep)[1].physics.substeps, 120);
+        let [slow, far] =
+            [&of(PerturbationKind::LengthLimits)[0].physics, &of(PerturbationKind::LengthLimits)[1].physics];
         assert!((0.55..0.56).contains(&slow.limit_share) && far.limit_share == 0.8);
         assert_eq!((far.limit_low, far.limit_high, slow.limit_low), (0.6, 1.6, 0.75));
-        assert_eq!(of(Kind::SelfContact)[0].physics.self_contact_weight, 1.0);
+        assert_eq!(of(PerturbationKind::SelfContact)[0].physics.self_contact_weight, 1.0);
     }
 
     #[test]
     fn one_pixel_under_a_sensor_is_inverted_in_each_image_and_draws_differ() {
-        let changed = of(Kind::Pixel);
-        assert_eq!(changed, of(Kind::Pixel));
+        let changed = of(PerturbationKind::Pixel);
+        assert_eq!(changed, of(PerturbationKind::Pixel));
         for setting in &changed {
             for (stimulus, plain) in setting.stimuli.iter().zip([0.25, 1.0]) {
                 let differing: Vec<_> = stimulus.iter().filter(|(_, v)| **v != plain).collect();
@@ -515,8 +524,8 @@ mod tests {
         assert!(changed.iter().any(|other| *other != changed[0]));
         // With two sensors one pixel is more than noise.
         let few = Perturbation::all(&Sizes::default(), &setting().body, RolloutMode::Fresh);
-        assert!(few.iter().all(|p| p.kind() != Kind::Pixel));
-        let blind = Setting { body: "33/44".parse().unwrap(), ..setting() };
+        assert!(few.iter().all(|p| p.kind() != PerturbationKind::Pixel));
+        let blind = PerturbedSetting { body: "33/44".parse().unwrap(), ..setting() };
         let pixel = Perturbation::Pixel { draw: 1, seed: 1 };
         assert_eq!(pixel.apply(&blind), blind);
     }
@@ -562,14 +571,14 @@ mod tests {
         assert_eq!(excused, ["length limits beyond all goals"]);
         for perturbation in all {
             let expected = match perturbation.kind() {
-                Kind::Mirror => [-2.0, -3.0],
-                Kind::Order => [3.0, 2.0],
+                PerturbationKind::Mirror => [-2.0, -3.0],
+                PerturbationKind::Order => [3.0, 2.0],
                 _ => [2.0, 3.0],
             };
             assert_eq!(perturbation.undo(vec![2.0, 3.0]), expected);
         }
         // Fresh rollouts have no order.
         let fresh = super::tests::all(RolloutMode::Fresh);
-        assert!(fresh.iter().all(|p| p.kind() != Kind::Order) && fresh.len() + 1 == names.len());
+        assert!(fresh.iter().all(|p| p.kind() != PerturbationKind::Order) && fresh.len() + 1 == names.len());
     }
 }

@@ -6,7 +6,7 @@ use crate::task::answer::Readout;
 
 /// An image and its stimulus.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Seen {
+pub struct LabelledStimulus {
     /// Its class.
     pub class: u8,
     /// Label for people, such as "0 (train 1)".
@@ -21,7 +21,7 @@ pub struct Phase {
     /// Index in [`Recording::frames`] of the frame before the phase's first control step.
     pub first_frame: usize,
     /// The image.
-    pub seen: Seen,
+    pub seen: LabelledStimulus,
     /// X displacement of the centre of mass over the phase, voxel lengths, right positive.
     pub displacement: f64,
 }

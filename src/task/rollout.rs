@@ -5,7 +5,7 @@ use crate::base::stop::Stopped;
 use crate::body::Body;
 use crate::sim::{Energy, Physics, Start, StepError, System, Unstable, World, Worlds};
 use crate::task::protocol::{Protocol, RolloutMode};
-use crate::task::recording::{Frame, Phase, Recording, Seen, VoxelCorners};
+use crate::task::recording::{Frame, LabelledStimulus, Phase, Recording, VoxelCorners};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -195,7 +195,7 @@ pub fn record(
     physics: &Physics,
     protocol: &Protocol,
     fresh: bool,
-    images: &[Seen],
+    images: &[LabelledStimulus],
 ) -> Recording {
     let system = Arc::new(System::new(body, physics.clone()));
     let mut rollout = Rollout::new(&system, protocol);
@@ -300,7 +300,8 @@ mod tests {
     }
 
     fn recorded(fresh: bool, physics: &Physics) -> Recording {
-        let seen = |class, label: &str, stimulus| Seen { class, label: label.to_string(), stimulus };
+        let seen =
+            |class, label: &str, stimulus| LabelledStimulus { class, label: label.to_string(), stimulus };
         let images = [seen(0, "dark", image(0.0, 0.0)), seen(1, "bright", image(1.0, 0.0))];
         record("r", &body(), physics, &protocol(), fresh, &images)
     }

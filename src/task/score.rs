@@ -9,7 +9,7 @@
 use crate::task::answer::{Answer, Assignment, of_split};
 use crate::task::fitness::Group;
 use crate::task::fitness::{Fitness, better};
-use crate::task::grouping::{Grouping, Split};
+use crate::task::grouping::{ClassSplit, Grouping};
 
 /// The task that a robot performs, and its fitness there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,7 +29,7 @@ pub fn two_group_fitness(answers: &[(Group, f64)]) -> f64 {
 impl Grouping {
     /// Returns the fitness on a task, or an **upper bound** of it while some answers are missing.
     /// Images of classes in neither of its groups do not count.
-    pub fn fitness_on(&self, split: &Split, answers: &[Answer]) -> f64 {
+    pub fn fitness_on(&self, split: &ClassSplit, answers: &[Answer]) -> f64 {
         better(self.fitness().of_assignments(of_split(split, answers)))
     }
 

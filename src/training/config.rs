@@ -8,7 +8,7 @@ use crate::config::validation::{LEAST, ValidationConfig};
 use crate::config::{BodyConfig, Config, DataConfig, reading};
 use crate::data::dataset::{Dataset, Split};
 use crate::images::held_out;
-use crate::images::training::{Training, scarcest};
+use crate::images::training::{TrainingImages, scarcest};
 use crate::images::whereabouts::{Whereabouts, part_of_others, size_of};
 use crate::store::images::DatasetRef;
 use crate::task::fitness::Fitness;
@@ -183,5 +183,6 @@ pub(crate) fn check_groups(groups: &Groups, dataset: &Dataset) -> Result<(), Err
 pub fn check(evolved: &Config, groups: &[Vec<u8>; 2], whereabouts: &Whereabouts) -> Result<(), Error> {
     let config = config_of(evolved, groups, None, &[])?;
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;
-    with_images(config, &Training::indices(evolved, &dataset)?, &dataset, &Session::default()).map(|_| ())
+    with_images(config, &TrainingImages::indices(evolved, &dataset)?, &dataset, &Session::default())
+        .map(|_| ())
 }

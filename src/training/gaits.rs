@@ -8,7 +8,7 @@ use crate::config::Config;
 use crate::config::train::TrainConfig;
 use crate::data::dataset::{Dataset, Split};
 use crate::images::held_out;
-use crate::images::training::Training;
+use crate::images::training::TrainingImages;
 use crate::response::gait::Gait;
 use crate::response::probing::Probing;
 use crate::robots::selection::Selection;
@@ -110,7 +110,12 @@ pub(crate) fn measured(
 }
 
 /// Hashes all that rollouts depend on, but not the challengers: more of them only add rollouts.
-pub(crate) fn key(config: &Config, seed_of_gaits: u64, walkers: &[Walker], training: &Training) -> String {
+pub(crate) fn key(
+    config: &Config,
+    seed_of_gaits: u64,
+    walkers: &[Walker],
+    training: &TrainingImages,
+) -> String {
     let bodies: Vec<String> = walkers.iter().map(|walker| walker.robot.body.to_string()).collect();
     let images: Vec<usize> = training.images.iter().map(|image| image.index).collect();
     let train = TrainConfig { challengers: 0, ..config.train };

@@ -13,7 +13,7 @@ use crate::store::training::{Batch, File};
 use crate::task::evaluation::fresh_rollouts_so_far;
 use crate::task::perturbation::Condition;
 use crate::training::rollouts::Rollouts;
-use crate::training::rounds::Plan;
+use crate::training::rounds::TrainingPlan;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -75,7 +75,7 @@ impl<'a> Log<'a> {
     }
 
     /// Starts a round or, if the plan has none, the evaluation of the robot as it is.
-    pub(crate) fn begins_round(&mut self, robot: &str, number: usize, plan: &Plan) {
+    pub(crate) fn begins_round(&mut self, robot: &str, number: usize, plan: &TrainingPlan) {
         match plan.rounds {
             0 => self.begins(format!("{robot}: as it is:"), plan.images),
             rounds => self.begins(format!("{robot}: round {number} of {rounds}:"), plan.images),

@@ -13,7 +13,7 @@ use crate::base::random::{Purpose, Stream, stream};
 use crate::body::{Body, Material};
 use crate::genome::other_voxel;
 use crate::response::gait::{CHOICES, Design, Gait};
-use crate::response::lesson::{Example, Lesson};
+use crate::response::lesson::{DesignProblem, Example};
 use crate::response::regression::{Evidence, Moments};
 use crate::sim::{Physics, width};
 use crate::task::fitness::clipped_margin;
@@ -257,7 +257,7 @@ impl<'a> Refinement<'a> {
             .collect();
         let examples: Vec<&Example> = examples.iter().collect();
         let design = gait.design();
-        let mut lesson = Lesson::new(&examples, &slopes, &design);
+        let mut lesson = DesignProblem::new(&examples, &slopes, &design);
         let places: Vec<usize> = (0..design.len()).filter(|_| random.unit() < 0.5).collect();
         lesson.best_changes(&places, 1 << random.below(MOST_SENSORS as usize + 1));
         let solved = lesson.design();

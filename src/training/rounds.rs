@@ -10,7 +10,7 @@ use crate::base::Grid;
 use crate::base::random::{Purpose, Stream, stream};
 use crate::body::{Body, Material};
 use crate::response::gait::{Design, Gait, SENSORS};
-use crate::response::lesson::Lesson;
+use crate::response::lesson::DesignProblem;
 use crate::response::regression::{Evidence, Moments, Response, dot};
 use crate::sim::Physics;
 use crate::task::fitness::clipped_margin;
@@ -39,7 +39,7 @@ const CHALLENGERS_OF_A_SET: usize = 30;
 
 /// The settings of a training.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plan {
+pub struct TrainingPlan {
     /// Seed of all random numbers.
     pub seed: u64,
     /// Rounds that measure the response around a design; 0: the robot keeps its own design.
@@ -83,7 +83,7 @@ pub enum First {
 
 /// A trained design.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Taught {
+pub struct TrainedDesign {
     /// The body.
     pub body: Body,
     /// Numbers of the training images on which it was evaluated at the end.
@@ -99,11 +99,11 @@ pub struct Taught {
 }
 
 /// Trains a gait with a known response to tell images apart.
-pub struct Teacher<'a> {
+pub struct GaitTrainer<'a> {
     gait: &'a Gait,
     physics: &'a Physics,
     images: Vec<Image>,
-    plan: Plan,
+    plan: TrainingPlan,
     ridge: f64,
     conditions: usize,
     /// Evidence of the slopes from all rollouts so far.
@@ -121,7 +121,7 @@ pub struct Teacher<'a> {
     rollouts: usize,
 }
 
-impl<'a> Teacher<'a> {
+impl<'a> GaitTrainer<'a> {
     /// Solves the design problem for the first design, by the response alone.
     ///
     /// # Panics
@@ -130,13 +130,13 @@ impl<'a> Teacher<'a> {
         gait: &'a Gait,
         response: &Response,
         images: Vec<Image>,
-        plan: Plan,
+        plan: TrainingPlan,
         physics: &'a Physics,
     ) -> Self {
         let conditions = 1 + images.iter().map(|image| image.condition).max().expect("there are images");
         let mut evidence = response.evidence.clone();
         evidence.fade(RANDOM_WEIGHT);
-        let mut teacher = Teacher {
+        let mut teacher = GaitTrainer {
             gait,
             physics,
             images,
@@ -279,13 +279,13 @@ impl<'a> Teacher<'a> {
         self,
         rollouts: &mut R,
         mut told: impl FnMut(&Challenge),
-    ) -> Result<Taught, R::Error> {
+    ) -> Result<TrainedDesign, R::Error> {
         let finalists = self.finalists();
         let body = self.gait.built(&self.design);
         let cell = |(row, column): &(usize, usize)| row * body.width() + column;
         let cells: Vec<usize> = self.gait.places().iter().map(cell).collect();
         let evidence = self.evidence.among(&cells, body.height() * body.width());
-        let Plan { seed, challengers, min_muscles, .. } = self.plan;
+        let TrainingPlan { seed, challengers, min_muscles, .. } = self.plan;
         let (mut numbers, images) = self.compared_on(0);
         let mut refinement = Refinement::new(
             body,
@@ -306,7 +306,7 @@ impl<'a> Teacher<'a> {
             let challenger = refinement.challenger();
             told(&refinement.challenge(challenger, rollouts)?);
         }
-        Ok(Taught {
+        Ok(TrainedDesign {
             body: refinement.body().clone(),
             shown: numbers,
             displacements: refinement.displacements().to_vec(),
@@ -410,9 +410,9 @@ impl<'a> Teacher<'a> {
 
     /// Solves the design problem from a design on; returns the predicted objective and the
     /// solution.
-    fn solved(&self, from: &[Material], side: f64, solve: impl FnOnce(&mut Lesson)) -> (f64, Design) {
+    fn solved(&self, from: &[Material], side: f64, solve: impl FnOnce(&mut DesignProblem)) -> (f64, Design) {
         let examples = self.images.iter().map(|image| (&image.example, self.intercepts[image.condition]));
-        let mut lesson = Lesson::predicted(examples, &self.slopes, from, side);
+        let mut lesson = DesignProblem::predicted(examples, &self.slopes, from, side);
         solve(&mut lesson);
         (lesson.objective(), lesson.design())
     }
@@ -436,7 +436,7 @@ mod tests {
     use crate::body::Body;
     use crate::response::gait::{CHOICES, random_image};
     use crate::response::lesson::Example;
-    use crate::response::regression::Shown;
+    use crate::response::regression::RandomRollout;
     use std::convert::Infallible;
 
     /// A body that walks by the widths of its places with diminishing effect; its slopes depend a
@@ -492,17 +492,18 @@ mod tests {
             let mut shown = |number: usize| {
                 let image = random_image(1, self.slopes.len(), &self.physics, &mut random);
                 let widths = self.gait.widths(&probe, &image, &self.physics);
-                Shown { displacement: self.walks(&widths, number % 2), widths, condition: number % 2 }
+                RandomRollout { displacement: self.walks(&widths, number % 2), widths, condition: number % 2 }
             };
             Response::of(&(0..rollouts).map(&mut shown).collect::<Vec<_>>()).unwrap()
         }
 
         /// Trains; returns the design, the rounds, and the accuracies of the first and the last
         /// design.
-        fn taught(&mut self, images: usize, response: usize) -> (Taught, Vec<Round>, [f64; 2]) {
+        fn taught(&mut self, images: usize, response: usize) -> (TrainedDesign, Vec<Round>, [f64; 2]) {
             let (gait, physics) = (self.gait.clone(), self.physics.clone());
             let images = self.images(images);
-            let mut teacher = Teacher::new(&gait, &self.response(response), images.clone(), PLAN, &physics);
+            let mut teacher =
+                GaitTrainer::new(&gait, &self.response(response), images.clone(), PLAN, &physics);
             let first = (teacher.design.clone(), teacher.side);
             let mut rounds = Vec::new();
             for _ in 0..PLAN.rounds {
@@ -548,8 +549,8 @@ mod tests {
         }
     }
 
-    const PLAN: Plan =
-        Plan { seed: 3, rounds: 4, images: 60, final_images: 100, challengers: 12, min_muscles: 0 };
+    const PLAN: TrainingPlan =
+        TrainingPlan { seed: 3, rounds: 4, images: 60, final_images: 100, challengers: 12, min_muscles: 0 };
 
     #[test]
     fn a_gait_is_taught_more_than_a_response_of_few_rollouts_says() {
@@ -585,8 +586,8 @@ mod tests {
         let planted = Planted::new(4);
         let (gait, response, images) = (planted.gait.clone(), planted.response(40), planted.images(600));
         let classes = |final_images: usize, draw: usize| -> BTreeSet<u8> {
-            let plan = Plan { final_images, ..PLAN };
-            let teacher = Teacher::new(&gait, &response, images.clone(), plan, &planted.physics);
+            let plan = TrainingPlan { final_images, ..PLAN };
+            let teacher = GaitTrainer::new(&gait, &response, images.clone(), plan, &planted.physics);
             let (numbers, _) = teacher.compared_on(draw);
             assert_eq!(numbers.iter().collect::<BTreeSet<_>>().len(), final_images, "each once");
             let first = numbers.iter().filter(|number| images[**number].class == 0).count();

@@ -8,7 +8,7 @@ use crate::base::session::Session;
 use crate::base::text::counted;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
-use crate::images::training::Training;
+use crate::images::training::TrainingImages;
 use crate::images::whereabouts::see;
 use crate::response::gait::Gait;
 use crate::response::lesson::Example;
@@ -22,7 +22,7 @@ use crate::training::gaits::Walker;
 use crate::training::log::{Kept, Log, stopped};
 use crate::training::race::Challenge;
 use crate::training::rollouts::Image;
-use crate::training::rounds::{First, Plan, Round, Taught, Teacher};
+use crate::training::rounds::{First, GaitTrainer, Round, TrainedDesign, TrainingPlan};
 use crate::training::window::{Found, Windows};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -30,7 +30,7 @@ use std::sync::atomic::Ordering;
 pub(crate) struct Trainer<'a> {
     pub(crate) config: &'a Config,
     pub(crate) dataset: &'a Dataset,
-    pub(crate) training: &'a Training,
+    pub(crate) training: &'a TrainingImages,
     pub(crate) probing: Probing,
     /// Displacements of each gait with random images that were known beforehand.
     pub(crate) measured: Vec<Batch>,
@@ -95,9 +95,9 @@ impl Trainer<'_> {
         training.images.iter().zip(&training.conditions).zip(ways).map(image).collect()
     }
 
-    fn plan(&self) -> Plan {
+    fn plan(&self) -> TrainingPlan {
         let train = &self.config.train;
-        Plan {
+        TrainingPlan {
             seed: self.config.seed,
             rounds: train.rounds,
             images: train.images,
@@ -113,10 +113,10 @@ impl Trainer<'_> {
         walkers: &'w [Walker<'w>],
         log: &mut Log,
         session: &Session,
-    ) -> Result<(&'w Walker<'w>, Config, Taught), Error> {
+    ) -> Result<(&'w Walker<'w>, Config, TrainedDesign), Error> {
         let plan = self.plan();
         let Trainer { config, probing, .. } = self;
-        let mut best: Option<(&Walker, Config, Teacher)> = None;
+        let mut best: Option<(&Walker, Config, GaitTrainer)> = None;
         for (walker, measured) in walkers.iter().zip(&self.measured) {
             let (gait, robot) = (&walker.gait, &walker.robot.id);
             log.begins(format!("{robot}: response:"), self.config.train.random_images);
@@ -124,7 +124,7 @@ impl Trainer<'_> {
             report_response(session, &walker.robot.id, gait, &response);
             let seeing = self.with_window(walker, &response, log, session)?;
             let images = self.images(gait, &seeing)?;
-            let mut teacher = Teacher::new(gait, &response, images, plan, &config.physics);
+            let mut teacher = GaitTrainer::new(gait, &response, images, plan, &config.physics);
             let conditions = probing.conditions();
             log.begins_round(robot, 1, &plan);
             let mut rollouts = Kept { config, conditions, log };
@@ -194,7 +194,7 @@ fn report_own(session: &Session, robot: &str, fitness: f64) {
     session.observer.finding("own", &serde_json::json!({ "robot": robot, "fitness": fitness }));
 }
 
-fn report_round(session: &Session, robot: &str, round: &Round, plan: &Plan) {
+fn report_round(session: &Session, robot: &str, round: &Round, plan: &TrainingPlan) {
     let Round { round, predicted, measured, off, changed, rollouts } = round;
     let [p, m] = [predicted, measured].map(|fitness| number::fixed(*fitness, 2));
     session.observer.note(&format!("{robot}: round {round} of {}: fitness {m}, predicted {p}", plan.rounds));

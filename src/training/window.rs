@@ -13,7 +13,7 @@ use crate::body::Material;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
 use crate::response::gait::Gait;
-use crate::response::lesson::{Example, Lesson};
+use crate::response::lesson::{DesignProblem, Example};
 use crate::response::regression::Response;
 use crate::store::images::ImageRef;
 use crate::task::grouping::balanced;
@@ -127,7 +127,7 @@ impl<'a> Windows<'a> {
         let any = vec![Material::SensorExpand; gait.places().len()];
         let solved = |(draw, side)| {
             let examples = examples.iter().map(|example| (example, response.intercept));
-            let mut lesson = Lesson::predicted(examples, &response.slopes, &any, side);
+            let mut lesson = DesignProblem::predicted(examples, &response.slopes, &any, side);
             lesson.solve(&mut stream(self.config.seed, Purpose::Windows, 1, draw));
             lesson.objective()
         };
@@ -171,7 +171,7 @@ fn least(side: usize) -> usize {
 mod tests {
     use super::*;
 
-    use crate::response::regression::Shown;
+    use crate::response::regression::RandomRollout;
     use crate::task::stimulus::Reduction;
 
     /// A body of 4 × 4 voxels that only its lower right quarter moves, and images of 12 × 12 pixels
@@ -190,9 +190,9 @@ mod tests {
                 let widths: Vec<f64> = (0..16).map(|_| if random.unit() < 0.5 { 0.6 } else { 1.6 }).collect();
                 let moved = |place: &usize| place / 4 >= 2 && place % 4 >= 2;
                 let displacement = (0..16).filter(moved).map(|place| 6.0 * (widths[place] - 1.1)).sum();
-                Shown { widths, displacement, condition: number % 2 }
+                RandomRollout { widths, displacement, condition: number % 2 }
             };
-            let rollouts: Vec<Shown> = (0..200).map(shown).collect();
+            let rollouts: Vec<RandomRollout> = (0..200).map(shown).collect();
             let mut config = Config::load("quickstart.toml", &[]).unwrap();
             (config.body.height, config.body.width) = (4, 4);
             (config.stimulus.reduction, config.train.windows) = (Reduction::Area, windows);

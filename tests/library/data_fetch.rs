@@ -10,7 +10,7 @@ use morphcog::base::observer::{Observer, Work};
 use morphcog::base::session::Session;
 use morphcog::base::stop::NEVER;
 use morphcog::data::catalogue::{Catalogue, RemoteFile};
-use morphcog::data::fetch::{AttemptError, FetchError, FetchOptions, Fetched, Outcome, Program};
+use morphcog::data::fetch::{AttemptError, FetchError, FetchOptions, FetchOutcome, Fetched, Program};
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -113,7 +113,7 @@ fn to(folder: &Path) -> FetchOptions {
     FetchOptions { to: Some(folder.to_path_buf()), ..FetchOptions::default() }
 }
 
-fn outcomes(fetched: Result<Vec<Fetched>, FetchError>) -> Vec<Outcome> {
+fn outcomes(fetched: Result<Vec<Fetched>, FetchError>) -> Vec<FetchOutcome> {
     fetched.unwrap().into_iter().map(|f| f.outcome).collect()
 }
 
@@ -160,14 +160,14 @@ fn right_files_are_written_and_then_kept() {
         let folder = root.path().join("data/mnist");
         let log = Log::default();
         let fetched = fetch(program, &catalogue(&[&mirror]), &to(&folder), &log);
-        let url = |name: &str| Outcome::Downloaded(format!("{}/{name}", mirror.address));
+        let url = |name: &str| FetchOutcome::Downloaded(format!("{}/{name}", mirror.address));
         assert_eq!(outcomes(fetched), [url("images.gz"), url("labels.gz")]);
         assert_eq!(std::fs::read(folder.join("images.gz")).unwrap(), IMAGES);
         assert_eq!(names(&folder), ["images.gz", "labels.gz"]);
         assert_eq!(log.first(2), ["begins images.gz of 20", "received 20"]);
 
         let again = fetch(program, &catalogue(&[&mirror]), &to(&folder), &());
-        assert_eq!(outcomes(again), [Outcome::Kept, Outcome::Kept]);
+        assert_eq!(outcomes(again), [FetchOutcome::Kept, FetchOutcome::Kept]);
         assert_eq!(mirror.asked().len(), 2);
         let forced = FetchOptions { force: true, ..to(&folder) };
         fetch(program, &catalogue(&[&mirror]), &forced, &()).unwrap();
@@ -183,7 +183,8 @@ fn a_file_that_a_mirror_lacks_comes_from_the_next() {
         let folder = tempfile::tempdir().unwrap();
         let log = Log::default();
         let fetched = fetch(program, &catalogue(&[&first, &second]), &to(folder.path()), &log);
-        let url = |mirror: &Mirror, name: &str| Outcome::Downloaded(format!("{}/{name}", mirror.address));
+        let url =
+            |mirror: &Mirror, name: &str| FetchOutcome::Downloaded(format!("{}/{name}", mirror.address));
         assert_eq!(outcomes(fetched), [url(&second, "images.gz"), url(&first, "labels.gz")]);
         assert_eq!(log.first(3), ["begins images.gz of 20", "begins images.gz of 20", "received 20"]);
     }
@@ -279,7 +280,7 @@ fn the_published_content_is_kept_however_it_is_packed() {
         std::fs::write(folder.path().join("images.gz"), packed.finish().unwrap()).unwrap();
         std::fs::write(folder.path().join("labels"), LABELS).unwrap();
         let fetched = fetch(program, &catalogue(&[&mirror]), &to(folder.path()), &());
-        assert_eq!(outcomes(fetched), [Outcome::Kept, Outcome::Kept]);
+        assert_eq!(outcomes(fetched), [FetchOutcome::Kept, FetchOutcome::Kept]);
         assert!(mirror.asked().is_empty());
 
         // One that is not packed and says something else would be as good as the one beside it.
@@ -421,7 +422,7 @@ fn without_a_program_for_downloads_what_to_fetch_by_hand_is_said() {
     std::fs::write(sandbox.path("own/labels.gz"), LABELS).unwrap();
     let there = catalogue(&[]);
     let kept = morphcog::data::fetch::fetch(&there, &to(&sandbox.path("own")), &[], &Session::default());
-    assert_eq!(outcomes(kept), [Outcome::Kept, Outcome::Kept]);
+    assert_eq!(outcomes(kept), [FetchOutcome::Kept, FetchOutcome::Kept]);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use crate::common::program::{Made, Sandbox, TINY};
 use morphcog::base::observer::{Observer, Work};
 use morphcog::base::session::Session;
-use morphcog::commands::audit::Options;
+use morphcog::commands::audit::AuditOptions;
 use morphcog::robots::selection::Selection;
 use morphcog::store::audit::AuditFile;
 use morphcog::store::audit::Verdict;
@@ -269,7 +269,7 @@ fn what_a_stopped_audit_was_done_with_is_kept() {
     let whole = verdicts(&sandbox);
     std::fs::remove_file(sandbox.path("run/audit.json")).unwrap();
     let impatient = Impatient { rollouts: AtomicU64::new(0), stop: AtomicBool::new(false) };
-    let options = Options {
+    let options = AuditOptions {
         archive: sandbox.path("run/run.json"),
         robots: Selection::All,
         seed: 1,

@@ -3,7 +3,7 @@
 
 use crate::common::program::{Made, Sandbox, TINY};
 use morphcog::base::session::Session;
-use morphcog::commands::capacity::Options;
+use morphcog::commands::capacity::CapacityOptions;
 use morphcog::config::capacity::CapacityConfig;
 use morphcog::store::capacity::CapacityFile;
 use morphcog::store::eval::EvalFile;
@@ -163,7 +163,7 @@ fn what_was_found_stays_if_the_next_search_is_stopped_before_it_finds_anything()
     let sandbox = sandbox();
     capacity(&sandbox, "");
     let found = sandbox.read("runs/capacity.json");
-    let options = Options {
+    let options = CapacityOptions {
         eval: sandbox.path("runs/eval.json"),
         config: CapacityConfig::load(None, &["seed=2".to_string()]).unwrap(),
         physical_only: false,

@@ -6,7 +6,7 @@ use crate::common::program::{Sandbox, TINY};
 use morphcog::base::session::Session;
 use morphcog::body::{Body, Material};
 use morphcog::config::Config;
-use morphcog::images::training::Training;
+use morphcog::images::training::TrainingImages;
 use morphcog::store::run::RunFile;
 use morphcog::task::evaluation::{Job, Outcome, Savings, evaluate};
 use std::path::Path;
@@ -32,7 +32,7 @@ fn evolve(sandbox: &Sandbox) -> RunFile {
 fn a_robot_is_as_fit_as_opposite_images_move_its_probe_apart() {
     let sandbox = sandbox();
     let run = evolve(&sandbox);
-    let training = Training::load(&run.config, None::<&Path>).unwrap();
+    let training = TrainingImages::load(&run.config, None::<&Path>).unwrap();
     let mut moved = 0;
     for robot in &run.elites {
         // Bodies stay as their genomes say.
@@ -43,7 +43,7 @@ fn a_robot_is_as_fit_as_opposite_images_move_its_probe_apart() {
         let probe = Body::new(probe).unwrap();
         let places = probe.counts().sensor;
         let job = Job { body: &probe, order: vec![], may_win: Box::new(|_| true), given_up: None };
-        let Training { stimuli, conditions, .. } = &training;
+        let TrainingImages { stimuli, conditions, .. } = &training;
         let Config { physics, protocol, .. } = &run.config;
         let (savings, stop) = (Savings::default(), AtomicBool::new(false));
         let evaluation =

@@ -18,7 +18,7 @@ use morphcog::sim::Physics;
 use morphcog::task::answer::Direction;
 use morphcog::task::evaluation::fresh_rollouts;
 use morphcog::task::protocol::Protocol;
-use morphcog::task::recording::{Frame, Seen};
+use morphcog::task::recording::{Frame, LabelledStimulus};
 use morphcog::task::rollout::record;
 use morphcog::task::stimulus::{Encoding, Reduction, StimulusParams, stimulus};
 use serde_json::{Value, json};
@@ -472,7 +472,7 @@ fn a_simulation_is_what_the_engine_computes() {
     let robot = published::find("QMAXD").unwrap().unwrap();
     let seen = stimulus(&drawing(), 14, 14, &config.stimulus).unwrap();
     let protocol = Protocol { control_steps: 120, ..config.protocol.clone() };
-    let images = [Seen { class: 0, label: "drawing".to_string(), stimulus: seen.clone() }];
+    let images = [LabelledStimulus { class: 0, label: "drawing".to_string(), stimulus: seen.clone() }];
     let expected = record("QMAXD", &robot.body, &config.physics, &protocol, true, &images);
 
     let begin = &events[0].1;

@@ -7,7 +7,7 @@ use morphcog::commands::evolve;
 use morphcog::commands::train;
 use morphcog::config::Config;
 use morphcog::data::dataset::Split;
-use morphcog::images::training::Training;
+use morphcog::images::training::TrainingImages;
 use morphcog::images::whereabouts::load_dataset;
 use morphcog::response::gait::Gait;
 use morphcog::robots::selection::Selection;
@@ -491,7 +491,7 @@ fn made_by(config: &str, groups: &str) -> usize {
     };
     let Ok(config) = Config::parse(config, "any.toml", &[]) else { return 0 };
     let if_exists = IfExists::Refuse;
-    let options = evolve::Options {
+    let options = evolve::EvolveOptions {
         config: config.clone(),
         name: "any".to_string(),
         out: sandbox.path("any"),
@@ -505,7 +505,7 @@ fn made_by(config: &str, groups: &str) -> usize {
     if read("any").elites.is_empty() {
         return 1;
     }
-    let options = train::Options {
+    let options = train::TrainOptions {
         archive: sandbox.path("any/run.json"),
         robots: Selection::Top(3),
         groups: groups.parse().unwrap(),
@@ -663,7 +663,7 @@ fn images_of_an_earlier_training_never_validate_a_later_one() {
     assert!(first.training_images.iter().all(|image| before.contains(&image.index)), "{}", before.len());
     // Also those that it drew and was not shown last.
     let drawn =
-        Training::indices(&first.config, &load_dataset(&first.config, None, &[Split::Train]).unwrap());
+        TrainingImages::indices(&first.config, &load_dataset(&first.config, None, &[Split::Train]).unwrap());
     let drawn = drawn.unwrap();
     assert!(drawn.len() > first.training_images.len() && drawn.iter().all(|index| before.contains(index)));
 }

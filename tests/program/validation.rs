@@ -5,11 +5,11 @@ use crate::common::program::{Made, Sandbox, TINY};
 use morphcog::base::observer::{Generation, Observer};
 use morphcog::base::session::Session;
 use morphcog::base::stop::NEVER;
-use morphcog::commands::evolve::{Options, evolve};
+use morphcog::commands::evolve::{EvolveOptions, evolve};
 use morphcog::config::Config;
 use morphcog::data::dataset::Split;
 use morphcog::images::held_out::images;
-use morphcog::images::training::Training;
+use morphcog::images::training::TrainingImages;
 use morphcog::images::whereabouts::load_dataset;
 use morphcog::store::audit::AuditFile;
 use morphcog::store::eval::EvalFile;
@@ -55,7 +55,7 @@ fn validation_images_are_of_the_training_split_and_were_never_trained_on() {
     let dataset = load_dataset(&run.config, None, &[Split::Train]).unwrap();
     // All that there are: whatever was trained on is left out.
     let trained: std::collections::BTreeSet<usize> =
-        Training::indices(&run.config, &dataset).unwrap().into_iter().collect();
+        TrainingImages::indices(&run.config, &dataset).unwrap().into_iter().collect();
     assert_eq!(trained.len(), 6);
     let of_class =
         |class| dataset.indices_of(Split::Train, class).iter().filter(|i| !trained.contains(i)).count();
@@ -136,7 +136,7 @@ fn robots_are_compared_on_validation_images_without_a_look_at_the_test_images() 
     let turned = EvalFile::read(&sandbox.path("eval-validation.json")).unwrap();
     assert_eq!(turned.images, report.images);
     for run in [&run, &other] {
-        let trained = Training::indices(&run.config, &dataset).unwrap();
+        let trained = TrainingImages::indices(&run.config, &dataset).unwrap();
         assert!(!trained.is_empty());
         assert!(report.images.iter().all(|image| !trained.contains(&image.index)));
     }
@@ -263,7 +263,7 @@ fn evolve_itself_chooses_robots_at_its_end_and_so_whatever_calls_it() {
     }
     let sandbox = validated();
     let config = Config::parse(&validating(), "run.toml", &[]).unwrap();
-    let options = |folder: &str| Options {
+    let options = |folder: &str| EvolveOptions {
         config: config.clone(),
         name: "run".to_string(),
         out: sandbox.path(folder),

@@ -17,13 +17,13 @@ use morphcog::cli::explain::explain;
 use morphcog::cli::output::console::{Console, Mode};
 use morphcog::cli::output::reporters::Reporter;
 use morphcog::commands::evolve;
-use morphcog::commands::evolve::Options;
-use morphcog::commands::plot::{self, Kind, Wanted};
+use morphcog::commands::evolve::EvolveOptions;
+use morphcog::commands::plot::{self, FigureKind, PlotOptions};
 use morphcog::commands::simulate::{Scenario, simulate};
 use morphcog::commands::{eval, replay};
 use morphcog::config::Config;
 use morphcog::draw::plot::{Background, confusion, poster};
-use morphcog::images::training::Training;
+use morphcog::images::training::TrainingImages;
 use morphcog::robots::selection::Selection;
 use morphcog::serve::server::Server;
 use morphcog::serve::{self, Service};
@@ -185,7 +185,8 @@ impl World {
             seeds.insert(kind, std::fs::read(sandbox.path(name)).unwrap());
         }
         let archives = vec![sandbox.path("run/run.json")];
-        let (service, _) = Service::open(&serve::Options { archives, ..serve::Options::default() }).unwrap();
+        let (service, _) =
+            Service::open(&serve::ServeOptions { archives, ..serve::ServeOptions::default() }).unwrap();
         let server = Server::bind(service, 0).unwrap();
         let port = server.url().rsplit(':').next().unwrap().trim_end_matches('/').parse().unwrap();
         static NEVER: AtomicBool = AtomicBool::new(false);
@@ -221,15 +222,15 @@ impl World {
     }
 
     /// Makes a figure, and looks at what was said.
-    fn plot(&self, case: &mut Case, kind: Kind, archive: &Path, name: &str) {
+    fn plot(&self, case: &mut Case, kind: FigureKind, archive: &Path, name: &str) {
         let (out, err) = (Page::default(), Page::default());
         let console = Console::with_writers(Mode::Human, Box::new(out.clone()), Box::new(err.clone()));
         let reporter = Reporter::new(&console);
-        let wanted = Wanted {
+        let wanted = PlotOptions {
             kind,
             archives: vec![archive.to_path_buf()],
             robots: Vec::new(),
-            options: replay::Options::default(),
+            options: replay::ReplayOptions::default(),
             every: 0,
             out: Some(self.sandbox.path("figure.svg")),
             dpi: Some(36),
@@ -263,7 +264,7 @@ fn run(world: &World, dice: &mut Dice, case: &mut Case) {
     let folder = world.with("run.json", &case.input);
     let archive = folder.join("run.json");
     let Some(run) = case.check(RunFile::read(&archive), "run.json") else { return };
-    let options = eval::Options {
+    let options = eval::EvalOptions {
         archives: vec![archive.clone()],
         robots: Selection::Top(1),
         images: HowMany::Evenly(2),
@@ -287,13 +288,16 @@ fn run(world: &World, dice: &mut Dice, case: &mut Case) {
     };
     case.check(eval::eval(&options, &Session::new(&stop, &()).threads(Some(1))), "run.json");
     drop(ended);
-    world.plot(case, Kind::Archive, &archive, "run.json");
+    world.plot(case, FigureKind::Archive, &archive, "run.json");
     let substeps = run.config.protocol.control_steps as f64 * f64::from(run.config.physics.substeps);
     if substeps < 1e5 {
-        world.plot(case, Kind::Spacetime, &archive, "run.json");
+        world.plot(case, FigureKind::Spacetime, &archive, "run.json");
     }
     case.check(
-        Service::open(&serve::Options { archives: vec![archive.clone()], ..serve::Options::default() }),
+        Service::open(&serve::ServeOptions {
+            archives: vec![archive.clone()],
+            ..serve::ServeOptions::default()
+        }),
         "run.json",
     );
 }
@@ -314,26 +318,26 @@ fn config(world: &World, dice: &mut Dice, case: &mut Case) {
     };
     let path = world.sandbox.write(name, &case.input);
     if let Some(config) = case.check(Config::load(&path.to_string_lossy(), &[]), name) {
-        let _ = Training::load(&config, None);
+        let _ = TrainingImages::load(&config, None);
     }
 }
 
 fn evaluation(world: &World, dice: &mut Dice, case: &mut Case) {
     case.input = world.json("eval", dice);
     let folder = world.with("eval.json", &case.input);
-    world.plot(case, Kind::Accuracy, &folder.join("eval.json"), "eval.json");
-    world.plot(case, Kind::Accuracy, &folder.join("run.json"), "eval.json");
+    world.plot(case, FigureKind::Accuracy, &folder.join("eval.json"), "eval.json");
+    world.plot(case, FigureKind::Accuracy, &folder.join("run.json"), "eval.json");
 }
 
 fn audit(world: &World, dice: &mut Dice, case: &mut Case) {
     case.input = world.json("audit", dice);
     let folder = world.with("audit.json", &case.input);
     case.check(AuditFile::read(&folder.join("audit.json")), "audit.json");
-    let options = replay::Options {
+    let options = replay::ReplayOptions {
         robot: "best".to_string(),
         physical_only: true,
         archive: Some(folder.join("run.json")),
-        ..replay::Options::default()
+        ..replay::ReplayOptions::default()
     };
     case.check(replay::find(&options), "audit.json");
 }
@@ -341,7 +345,7 @@ fn audit(world: &World, dice: &mut Dice, case: &mut Case) {
 fn capacity(world: &World, dice: &mut Dice, case: &mut Case) {
     case.input = world.json("capacity", dice);
     let folder = world.with("capacity.json", &case.input);
-    world.plot(case, Kind::Capacity, &folder.join("capacity.json"), "capacity.json");
+    world.plot(case, FigureKind::Capacity, &folder.join("capacity.json"), "capacity.json");
 }
 
 /// What a report shows of a team.
@@ -357,7 +361,7 @@ fn team(world: &World, dice: &mut Dice, case: &mut Case) {
 fn metrics(world: &World, dice: &mut Dice, case: &mut Case) {
     case.input = bytes(dice, &world.seeds["metrics"]);
     let folder = world.with("metrics.csv", &case.input);
-    world.plot(case, Kind::Progress, &folder.join("run.json"), "metrics.csv");
+    world.plot(case, FigureKind::Progress, &folder.join("run.json"), "metrics.csv");
 }
 
 /// Goes on with a run from a wrong checkpoint, signed again or not.
@@ -374,7 +378,7 @@ fn checkpoint(world: &World, dice: &mut Dice, case: &mut Case) {
     };
     let folder = world.with("checkpoint.json", &case.input);
     let before = std::fs::read(folder.join("run.json")).unwrap();
-    let options = Options {
+    let options = EvolveOptions {
         config: Config::parse(FEW, "few.toml", &[]).unwrap(),
         name: "few".to_string(),
         out: folder.clone(),

@@ -6,7 +6,7 @@ use crate::common::program::{PROGRAM, Sandbox, TINY, files, gaits, without_secon
 use crate::common::server::Server;
 use morphcog::base::error::ErrorKind;
 use morphcog::base::session::Session;
-use morphcog::commands::evolve::{Options, evolve};
+use morphcog::commands::evolve::{EvolveOptions, evolve};
 use morphcog::config::Config;
 use morphcog::store::folder::IfExists;
 use std::io::Read;
@@ -298,7 +298,7 @@ fn a_run_stopped_at_any_moments_goes_on_to_the_same_bytes() {
         let text = text.replace("control_steps = 20", "control_steps = 60");
         sandbox.write(&format!("{name}.toml"), &text);
         sandbox.run(&format!("evolve -q -c {name}.toml -o {name}-whole")).ended(0, &[]);
-        let options = Options {
+        let options = EvolveOptions {
             config: Config::parse(&text, "run.toml", &[]).unwrap(),
             name: name.to_string(),
             out: sandbox.path(name),

@@ -3,7 +3,7 @@
 use crate::base::observer::Generation;
 use crate::base::text::one_line;
 use crate::cli::output::console::{Console, Mode, lock};
-use crate::cli::output::progress::{Pacer, Recent, Words, count_line, generation_line};
+use crate::cli::output::progress::{Pacer, ProgressWords, Recent, count_line, generation_line};
 use crate::cli::output::wrapping::one_of;
 use indicatif::ProgressBar;
 use serde::Serialize;
@@ -26,10 +26,10 @@ impl<'c> Line<'c> {
     }
 
     /// Displays the text, which depends on the seconds since the beginning.
-    fn show(&self, done: u64, text: impl FnOnce(f64) -> Words) {
+    fn show(&self, done: u64, text: impl FnOnce(f64) -> ProgressWords) {
         let seconds = self.begin.elapsed().as_secs_f64();
         let text = |columns: usize| {
-            let Words { label, parts } = text(seconds);
+            let ProgressWords { label, parts } = text(seconds);
             let parts: Vec<String> = parts.iter().map(|part| one_line(part)).collect();
             one_of(&one_line(&label), &parts, columns)
         };

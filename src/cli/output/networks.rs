@@ -6,7 +6,7 @@ use crate::base::number::percent;
 use crate::baseline::curve::Crossing;
 use crate::cli::output::console::{Console, Mode};
 use crate::commands::capacity::FIGURES;
-use crate::commands::reproduce::Finished;
+use crate::commands::reproduce::ReproduceOutcome;
 use crate::draw::error::{PictureError, write_whole};
 use crate::draw::plot;
 use crate::draw::report::tables::size;
@@ -104,7 +104,7 @@ pub fn figure(file: &CapacityFile, out: &Path) -> Result<[PathBuf; 2], PictureEr
 }
 
 /// Writes the paper's table after a reproduction, with the paper's values beside ours.
-pub fn table(console: &Console, finished: &Finished) {
+pub fn table(console: &Console, finished: &ReproduceOutcome) {
     if console.mode() == Mode::Json {
         return console.event("reproduced", &finished.rows);
     }

@@ -55,7 +55,7 @@ fn or_default(asked: &[Format]) -> &[Format] {
 
 /// The pictures to make, and their files.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Wanted {
+pub struct PicturesWanted {
     /// The formats with their files (unused for the terminal).
     pub files: Vec<(Format, PathBuf)>,
     /// The width of GIF and PNG, pixels.
@@ -68,17 +68,17 @@ pub struct Wanted {
     pub look: Look,
 }
 
-impl Default for Wanted {
+impl Default for PicturesWanted {
     fn default() -> Self {
-        Wanted { files: Vec::new(), width: 480, every: 1, fps: 50, look: Look::Plain }
+        PicturesWanted { files: Vec::new(), width: 480, every: 1, fps: 50, look: Look::Plain }
     }
 }
 
-impl Wanted {
+impl PicturesWanted {
     /// Chooses `replay-<name>.<format>` in a folder.
     pub fn beside(folder: &Path, name: &str, formats: &[Format]) -> Self {
         let file = |&format: &Format| (format, folder.join(format!("replay-{name}.{format}")));
-        Wanted { files: or_default(formats).iter().map(file).collect(), ..Wanted::default() }
+        PicturesWanted { files: or_default(formats).iter().map(file).collect(), ..PicturesWanted::default() }
     }
 
     /// Takes the format from a file's extension; without one, chooses a file for each of `formats`.
@@ -112,7 +112,7 @@ impl Wanted {
             .iter()
             .filter(|(format, _)| *format != Format::Terminal)
             .try_for_each(|(_, path)| folder::writable(path))?;
-        Ok(Wanted { files, ..Wanted::default() })
+        Ok(PicturesWanted { files, ..PicturesWanted::default() })
     }
 }
 
@@ -129,7 +129,7 @@ pub fn folder(archive: &Path) -> PathBuf {
 ///
 /// # Errors
 /// Returns an error if a picture cannot be made or written.
-pub fn make(console: &Console, replay: &Replay, wanted: &Wanted) -> Result<Vec<PathBuf>, Error> {
+pub fn make(console: &Console, replay: &Replay, wanted: &PicturesWanted) -> Result<Vec<PathBuf>, Error> {
     let failed = |error: PictureError| match error {
         PictureError::Size { .. } => Error::usage(error.to_string()).about("width"),
         error => error.into(),

@@ -38,7 +38,7 @@ impl<T: Copy> Recent<T> {
 
 /// A progress message: a label, and parts in order of importance.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Words {
+pub struct ProgressWords {
     /// The activity.
     pub label: String,
     /// The count, the remaining time, and so on.
@@ -46,7 +46,7 @@ pub struct Words {
 }
 
 /// Describes the progress of an evolution, given its state some seconds ago.
-pub fn generation_line(now: &Generation, before: &Generation, seconds: f64) -> Words {
+pub fn generation_line(now: &Generation, before: &Generation, seconds: f64) -> ProgressWords {
     let best = now.best.map_or("none".into(), |best| number::fixed(best, 2));
     let rate = rate(now.evaluations.saturating_sub(before.evaluations), seconds);
     let mut parts = vec![format!("{}/{}", now.done, now.total)];
@@ -54,12 +54,12 @@ pub fn generation_line(now: &Generation, before: &Generation, seconds: f64) -> W
     parts.push(format!("best {best}"));
     parts.push(format!("coverage {} %", number::percent(now.coverage)));
     parts.push(format!("{rate} evaluations/s"));
-    Words { label: "generation".to_string(), parts }
+    ProgressWords { label: "generation".to_string(), parts }
 }
 
 /// Describes the progress of something counted: images, robots or, with the unit "bytes",
 /// megabytes. `before` of them were done some seconds ago.
-pub fn count_line(label: &str, [before, done, total]: [u64; 3], unit: &str, seconds: f64) -> Words {
+pub fn count_line(label: &str, [before, done, total]: [u64; 3], unit: &str, seconds: f64) -> ProgressWords {
     let did = done.saturating_sub(before);
     let (counts, speed) = if unit == "bytes" {
         let mega = |bytes: f64| number::fixed(bytes / 1e6, 1);
@@ -72,7 +72,7 @@ pub fn count_line(label: &str, [before, done, total]: [u64; 3], unit: &str, seco
     let mut parts = vec![counts];
     parts.extend(left(before, done, total, seconds));
     parts.push(speed);
-    Words { label: label.to_string(), parts }
+    ProgressWords { label: label.to_string(), parts }
 }
 
 fn rate(count: u64, seconds: f64) -> String {
@@ -110,7 +110,7 @@ impl Pacer {
 mod tests {
     use super::*;
 
-    fn text(line: Words) -> String {
+    fn text(line: ProgressWords) -> String {
         format!("{}: {}", line.label, line.parts.join(", "))
     }
 

@@ -3,7 +3,7 @@
 use crate::base::number;
 use crate::base::number::percent;
 use crate::cli::output::console::{Console, Mode};
-use crate::commands::response::Finished;
+use crate::commands::response::ResponseOutcome;
 use crate::draw::error::{PictureError, write_whole};
 use crate::draw::plot;
 use crate::robots::published;
@@ -11,8 +11,8 @@ use crate::store::response::{EndedBy, RobotResponse};
 use std::path::Path;
 
 /// Writes the results of a measurement, a line per robot.
-pub fn response(console: &Console, finished: &Finished, out: &Path) {
-    let Finished { file, stopped, unwritten, .. } = finished;
+pub fn response(console: &Console, finished: &ResponseOutcome, out: &Path) {
+    let ResponseOutcome { file, stopped, unwritten, .. } = finished;
     let written = unwritten.is_none() && !file.robots.is_empty();
     if console.mode() == Mode::Json {
         let done = serde_json::json!({
@@ -90,8 +90,8 @@ fn row(robot: &RobotResponse, is_taught: bool, has_window: bool) -> Vec<String> 
 ///
 /// # Errors
 /// Returns an error if a picture cannot be made or written.
-pub fn pictures(console: &Console, finished: &Finished) -> Result<(), PictureError> {
-    let Finished { file, pictures, .. } = finished;
+pub fn pictures(console: &Console, finished: &ResponseOutcome) -> Result<(), PictureError> {
+    let ResponseOutcome { file, pictures, .. } = finished;
     for (robot, [svg, png]) in file.robots.iter().zip(pictures) {
         let of = format!("robot {}, {}", robot.id, published::provenance(&file.run, file.run_seed));
         let figure = plot::response(robot, file.setting.task.as_deref(), &of);

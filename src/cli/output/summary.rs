@@ -10,10 +10,10 @@ use crate::base::text::duration;
 use crate::cli::output::console::{Console, Mode};
 use crate::cli::output::networks;
 use crate::commands::bench::Speed;
-use crate::commands::data::Found;
-use crate::commands::evolve::Finished;
+use crate::commands::data::FoundDataset;
+use crate::commands::evolve::EvolveOutcome;
 use crate::commands::train;
-use crate::data::fetch::{Fetched, Outcome};
+use crate::data::fetch::{FetchOutcome, Fetched};
 use crate::draw::report::tables::of_robot;
 use crate::robots::published::Published;
 use crate::store::capacity::CapacityFile;
@@ -28,8 +28,8 @@ const SHOWN: usize = 5;
 
 /// Writes the results of an evolution: the fittest robots, the files and, unless the command itself
 /// continues, the next steps.
-pub fn evolution(console: &Console, finished: &Finished, out: &Path, goes_on: bool) {
-    let Finished { run, totals, .. } = finished;
+pub fn evolution(console: &Console, finished: &EvolveOutcome, out: &Path, goes_on: bool) {
+    let EvolveOutcome { run, totals, .. } = finished;
     if console.mode() == Mode::Json {
         let elites = run.elites.len();
         let best = finished.best();
@@ -102,8 +102,8 @@ pub fn evolution(console: &Console, finished: &Finished, out: &Path, goes_on: bo
 }
 
 /// Writes the results of a training.
-pub fn training(console: &Console, finished: &train::Finished, out: &Path) {
-    let train::Finished { run, rollouts, size, .. } = finished;
+pub fn training(console: &Console, finished: &train::TrainOutcome, out: &Path) {
+    let train::TrainOutcome { run, rollouts, size, .. } = finished;
     let Some(robot) = run.best() else { return };
     if console.mode() == Mode::Json {
         let done = serde_json::json!({
@@ -286,15 +286,15 @@ pub fn schemas(console: &Console, schemas: &[(&str, &str)]) {
 pub fn fetched(console: &Console, files: &[Fetched]) {
     for file in files {
         let how = match &file.outcome {
-            Outcome::Kept => "was there and is correct".to_string(),
-            Outcome::Downloaded(url) => format!("downloaded from {url}, checksum correct"),
+            FetchOutcome::Kept => "was there and is correct".to_string(),
+            FetchOutcome::Downloaded(url) => format!("downloaded from {url}, checksum correct"),
         };
         console.line_about(&file.file, &format!("{}: {how}", file.file.display()));
     }
 }
 
 /// Writes the facts about a dataset.
-pub fn dataset(console: &Console, found: &Found) {
+pub fn dataset(console: &Console, found: &FoundDataset) {
     let info = &found.info;
     if console.mode() == Mode::Json {
         let mut event = serde_json::to_value(info).expect("names, numbers and texts are JSON");

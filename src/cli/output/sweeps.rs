@@ -1,7 +1,7 @@
 //! The results of `sweep` and `reproduce`.
 
 use crate::analysis::progress::alike;
-use crate::analysis::sweep::{Collected, Columns, Row, csv};
+use crate::analysis::sweep::{Collected, Columns, SweepRow, csv};
 use crate::base::error::Error;
 use crate::base::files::write_atomically;
 use crate::base::number;
@@ -9,22 +9,22 @@ use crate::base::number::percent;
 use crate::base::text::counted;
 use crate::base::text::duration;
 use crate::cli::output::console::{Console, Mode};
-use crate::commands::tasks::Status;
+use crate::commands::tasks::TaskStatus;
 use crate::draw::error::write_whole;
 use crate::draw::plot;
 use crate::draw::plot::Figure;
-use crate::store::task::State;
+use crate::store::task::TaskState;
 use serde::Serialize;
 use serde_json::{Map, Value};
 use std::path::Path;
 
 /// Writes the status of tasks: a line per task, and the number in each state.
-pub fn status(console: &Console, all: &[Status]) {
+pub fn status(console: &Console, all: &[TaskStatus]) {
     if console.mode() == Mode::Json {
         return all.iter().for_each(|status| console.event("task", status));
     }
     let time = |seconds: Option<f64>| seconds.map_or("–".to_string(), duration);
-    let row = |status: &Status| {
+    let row = |status: &TaskStatus| {
         let generations = status.generations.map(|[done, of]| format!("{done}/{of}"));
         vec![
             status.task.to_string(),
@@ -32,7 +32,7 @@ pub fn status(console: &Console, all: &[Status]) {
             status.state.name().to_string(),
             generations.unwrap_or("–".to_string()),
             time(status.seconds),
-            if status.state == State::Done { "–".to_string() } else { time(status.seconds_left) },
+            if status.state == TaskState::Done { "–".to_string() } else { time(status.seconds_left) },
             status.about.clone().unwrap_or_default(),
         ]
     };
@@ -45,12 +45,12 @@ pub fn status(console: &Console, all: &[Status]) {
 }
 
 /// Counts the tasks in each state and estimates the remaining computing time.
-fn in_short(all: &[Status]) -> String {
-    let count = |state: State| all.iter().filter(|status| status.state == state).count();
-    let counts = State::ALL.map(|state| (count(state), state.name()));
+fn in_short(all: &[TaskStatus]) -> String {
+    let count = |state: TaskState| all.iter().filter(|status| status.state == state).count();
+    let counts = TaskState::ALL.map(|state| (count(state), state.name()));
     let counts = counts.iter().filter(|(count, _)| *count > 0).map(|(count, name)| format!("{count} {name}"));
     let counts = counts.collect::<Vec<_>>().join(", ");
-    let open = || all.iter().filter(|status| status.state != State::Done);
+    let open = || all.iter().filter(|status| status.state != TaskState::Done);
     let left: Option<f64> = open().map(|status| status.seconds_left).sum();
     let left = match left {
         Some(left) if open().count() > 0 => format!("; about {} of task time left", duration(left)),
@@ -67,7 +67,7 @@ pub fn collected(
     console: &Console,
     name: &str,
     found: &Collected,
-    status: &[Status],
+    status: &[TaskStatus],
     out: &Path,
 ) -> Result<(), Error> {
     let path = out.join("sweep.csv");
@@ -94,7 +94,7 @@ pub fn collected(
         draw("sweep-progress", plot::progress(&found.progress))?;
         differences(console, &found.progress);
     }
-    let open = status.iter().filter(|status| status.state != State::Done).count();
+    let open = status.iter().filter(|status| status.state != TaskState::Done).count();
     if open > 0 {
         console.warning(&format!("this is not all: {}", in_short(status)));
     }
@@ -106,14 +106,14 @@ pub fn collected(
 struct Event<'a> {
     number: usize,
     name: &'a str,
-    state: State,
+    state: TaskState,
     varied: Map<String, Value>,
     #[serde(flatten)]
     run: Columns<'a>,
 }
 
 impl<'a> Event<'a> {
-    fn of(row: &'a Row) -> Self {
+    fn of(row: &'a SweepRow) -> Self {
         // Values are stored as text; numbers become numbers here.
         let value = |text: &str| serde_json::from_str(text).unwrap_or_else(|_| Value::from(text));
         let varied = row.varied.iter().map(|(key, text)| (key.clone(), value(text))).collect();
@@ -121,8 +121,8 @@ impl<'a> Event<'a> {
     }
 }
 
-fn table(console: &Console, rows: &[Row]) {
-    let row = |row: &Row| {
+fn table(console: &Console, rows: &[SweepRow]) {
+    let row = |row: &SweepRow| {
         let run = row.run.as_ref();
         let share = |share: Option<f64>| share.map_or("–".to_string(), percent);
         let tested = run.and_then(|run| run.tested.as_ref());
@@ -162,7 +162,7 @@ pub fn differences(console: &Console, runs: &[crate::analysis::progress::Progres
     }
     console.line("");
     let headers: Vec<&str> = ["line", "runs"].into_iter().chain(keys.iter().map(String::as_str)).collect();
-    let row = |(number, group): (usize, &crate::analysis::progress::Group)| {
+    let row = |(number, group): (usize, &crate::analysis::progress::SettingsGroup)| {
         let values = group.values.iter().map(|value| value.clone().unwrap_or("–".to_string()));
         [number.to_string(), group.runs.len().to_string()].into_iter().chain(values).collect::<Vec<_>>()
     };

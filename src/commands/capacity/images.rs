@@ -6,14 +6,14 @@ use crate::base::hash::sha256_hex;
 use crate::base::random::{Purpose, stream};
 use crate::base::remedy::Remedy;
 use crate::base::session::Session;
-use crate::baseline::{Kind, Samples, Trained, train};
+use crate::baseline::{NetworkKind, Samples, Trained, train};
 use crate::config::capacity::CapacityConfig;
 use crate::data::dataset::{Dataset, Split};
 use crate::images::whereabouts::{Whereabouts, seen};
 use crate::store::eval::EvalFile;
 use crate::store::images::ImageRef;
 use crate::store::names::RUN_JSON;
-use crate::store::setting::{RunRef, Setting};
+use crate::store::setting::{RunRef, RunSetting};
 use crate::task::fitness::Group;
 use crate::task::grouping;
 use std::path::{Path, PathBuf};
@@ -37,7 +37,7 @@ pub(crate) struct Seen {
 impl Images {
     pub fn of(
         report: &EvalFile,
-        setting: &Setting,
+        setting: &RunSetting,
         (eval, config): (&Path, &CapacityConfig),
         session: &Session,
     ) -> Result<Images, Error> {
@@ -87,7 +87,7 @@ fn whereabouts(eval: &Path, session: &Session) -> Whereabouts {
 /// Draws images of the training split that no run was trained on last.
 fn waiting(
     dataset: &Dataset,
-    setting: &Setting,
+    setting: &RunSetting,
     runs: &[RunRef],
     config: &CapacityConfig,
 ) -> Result<Vec<ImageRef>, Error> {
@@ -117,7 +117,7 @@ fn waiting(
 
 /// The images of a task, with their groups, as networks of a kind see them.
 pub(crate) struct Task {
-    kind: Kind,
+    kind: NetworkKind,
     training: Vec<Samples>,
     waiting: Option<Samples>,
     test: Samples,
@@ -125,8 +125,8 @@ pub(crate) struct Task {
 
 impl Task {
     pub fn new(
-        split: &grouping::Split,
-        kind: Kind,
+        split: &grouping::ClassSplit,
+        kind: NetworkKind,
         config: &CapacityConfig,
         images: &Images,
     ) -> Result<Self, Error> {

@@ -1,13 +1,13 @@
 //! Images of `eval`, and the baselines on them that need no body.
 
-use crate::analysis::baselines::{Labelled, best_pixel, larger_group, nearest_training_image};
+use crate::analysis::baselines::{LabelledImage, best_pixel, larger_group, nearest_training_image};
 use crate::base::Grid;
 use crate::base::error::Error;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
 use crate::images::held_out;
 use crate::images::held_out::images_besides;
-use crate::images::training::Training;
+use crate::images::training::TrainingImages;
 use crate::images::whereabouts::{see, see_all};
 use crate::store::eval::Baselines;
 use crate::store::images::{HeldOut, HowMany, ImageRef};
@@ -106,7 +106,7 @@ impl<'a> HeldOutImages<'a> {
     pub fn baselines<'t>(
         &self,
         sources: &[StoredRun],
-        tasks: impl Iterator<Item = (&'t str, &'t grouping::Split)>,
+        tasks: impl Iterator<Item = (&'t str, &'t grouping::ClassSplit)>,
     ) -> Result<BTreeMap<String, Baselines>, Error> {
         let seen = |images: &[ImageRef]| -> Result<Vec<(Grid<f64>, u8)>, Error> {
             let stimulus = |index| see(self.config, self.dataset, Split::Train, index);
@@ -123,8 +123,8 @@ impl<'a> HeldOutImages<'a> {
         });
         let of_runs = is_own.then(|| of_runs.collect::<Result<Vec<_>, Error>>()).transpose()?;
         let shown = self.stimuli.iter().zip(&self.images);
-        let shown: Vec<Labelled> =
-            shown.map(|(stimulus, image)| Labelled { stimulus, class: image.label }).collect();
+        let shown: Vec<LabelledImage> =
+            shown.map(|(stimulus, image)| LabelledImage { stimulus, class: image.label }).collect();
         let mut all = BTreeMap::new();
         for (name, task) in tasks {
             if all.contains_key(name) {
@@ -170,13 +170,13 @@ impl<'a> HeldOutImages<'a> {
 /// Returns all images a run's robots were trained on; the file of a training has only the last.
 fn taught_with(run: &RunFile, dataset: &Dataset) -> Result<Vec<ImageRef>, Error> {
     match run.origin {
-        Some(_) => Training::images(&run.config, dataset),
+        Some(_) => TrainingImages::images(&run.config, dataset),
         None => Ok(run.training_images.clone()),
     }
 }
 
-fn labelled(list: &[(Grid<f64>, u8)]) -> Vec<Labelled<'_>> {
-    list.iter().map(|(stimulus, class)| Labelled { stimulus, class: *class }).collect()
+fn labelled(list: &[(Grid<f64>, u8)]) -> Vec<LabelledImage<'_>> {
+    list.iter().map(|(stimulus, class)| LabelledImage { stimulus, class: *class }).collect()
 }
 
 /// Returns the validation images that choose the robots of each run, `count` per run.

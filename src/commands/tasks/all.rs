@@ -6,11 +6,11 @@ use crate::base::session::Session;
 use crate::base::text::counted;
 use crate::base::threads;
 use crate::commands::tasks::steps::{is_done, run};
-use crate::commands::tasks::task::{Place, Run, Task};
+use crate::commands::tasks::task::{Run, Task, TaskFolders};
 use crate::config::{Config, DataConfig};
 use crate::data::dataset::{Dataset, Split};
 use crate::images::held_out;
-use crate::images::training::Training;
+use crate::images::training::TrainingImages;
 use crate::images::whereabouts::Whereabouts;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{DATA_FOLDER, TASK_JSON};
@@ -26,7 +26,7 @@ use std::sync::{Mutex, PoisonError};
 
 /// Summary of the tasks.
 #[derive(Clone, Debug, Default)]
-pub struct Summary {
+pub struct TasksSummary {
     /// Number of tasks done, now or before.
     pub done: usize,
     /// Numbers of the failed tasks.
@@ -44,7 +44,7 @@ pub struct Summary {
 /// Returns an error if images are missing.
 pub fn check_data<'a>(
     tasks: impl Iterator<Item = (usize, &'a Task)>,
-    place: &Place,
+    place: &TaskFolders,
     data: Option<&Path>,
 ) -> Result<(), Error> {
     let has_begun = |task: &Task| place.folder(task).join(DATA_FOLDER).exists();
@@ -70,7 +70,7 @@ pub fn check_data<'a>(
         }
         match &task.run {
             Run::Evolve(config, ..) => {
-                Training::images(config, dataset).map_err(named)?;
+                TrainingImages::images(config, dataset).map_err(named)?;
                 held_out::check(config, &[], "data.images_per_class", dataset).map_err(named)?;
             }
             Run::Train(training) => {
@@ -103,10 +103,10 @@ pub(crate) fn check_test(
 /// Returns an error if the folder cannot be made, or there are no images.
 pub fn run_all(
     tasks: &[Task],
-    place: &Place,
+    place: &TaskFolders,
     jobs: Option<usize>,
     session: &Session,
-) -> Result<Summary, Error> {
+) -> Result<TasksSummary, Error> {
     let is_open = |task: &&Task| {
         let known = TaskFile::read(&place.folder(task).join(TASK_JSON)).ok().flatten();
         !is_done(known.as_ref(), task, place)
@@ -131,7 +131,7 @@ pub fn run_all(
     }
     let all = All { session, known, parts: numbered.iter().map(|_| AtomicU64::new(0)).collect() };
     let next = AtomicUsize::new(0);
-    let summary = Mutex::new(Summary { done: before, ..Summary::default() });
+    let summary = Mutex::new(TasksSummary { done: before, ..TasksSummary::default() });
     // Tasks that other processes worked on.
     let elsewhere: Mutex<Vec<&Task>> = Mutex::new(Vec::new());
     let worker = || {

@@ -7,7 +7,7 @@ pub mod status;
 pub mod steps;
 pub mod task;
 
-pub use all::{Summary, check_data, run_all};
-pub use status::{Status, status};
+pub use all::{TasksSummary, check_data, run_all};
+pub use status::{TaskStatus, status};
 pub use steps::run;
-pub use task::{AuditStep, EvalStep, Place, Run, Steps, Task, Training, check_folders};
+pub use task::{AuditStep, EvalStep, Run, Steps, Task, TaskFolders, TrainRun, check_folders};

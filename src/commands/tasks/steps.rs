@@ -4,7 +4,7 @@ use crate::base::error::{Error, ErrorKind};
 use crate::base::remedy::Remedy;
 use crate::base::session::Session;
 use crate::commands::evolve;
-use crate::commands::tasks::task::{Place, Run, Task, selection};
+use crate::commands::tasks::task::{Run, Task, TaskFolders, selection};
 use crate::commands::train;
 use crate::commands::{audit, eval};
 use crate::robots::selection::Selection;
@@ -13,7 +13,7 @@ use crate::store::eval::EvalFile;
 use crate::store::folder::IfExists;
 use crate::store::lock::Lock;
 use crate::store::names::{AUDIT_JSON, RUN_JSON, TASK_JSON, TASK_LOCK};
-use crate::store::task::{State, TaskFile};
+use crate::store::task::{TaskFile, TaskState};
 use crate::task::answer;
 use std::time::Instant;
 
@@ -21,7 +21,7 @@ use std::time::Instant;
 ///
 /// # Errors
 /// Returns an error if it failed or was stopped, or another process works on it.
-pub fn run(task: &Task, place: &Place, session: &Session) -> Result<(), Error> {
+pub fn run(task: &Task, place: &TaskFolders, session: &Session) -> Result<(), Error> {
     let folder = place.folder(task);
     std::fs::create_dir_all(&folder).map_err(|error| Error::writing(&folder, &error))?;
     let lock = folder.join(TASK_LOCK);
@@ -42,9 +42,9 @@ pub fn run(task: &Task, place: &Place, session: &Session) -> Result<(), Error> {
     let ended = steps(task, place, session);
     file.seconds = before + began.elapsed().as_secs_f64();
     (file.state, file.error) = match &ended {
-        Ok(()) => (State::Done, None),
-        Err(error) if error.kind == ErrorKind::Stopped => (State::Stopped, None),
-        Err(error) => (State::Failed, Some(error.to_string())),
+        Ok(()) => (TaskState::Done, None),
+        Err(error) if error.kind == ErrorKind::Stopped => (TaskState::Stopped, None),
+        Err(error) => (TaskState::Failed, Some(error.to_string())),
     };
     // The reason it ended says more than a failure to record it.
     let written = file.write(&path);
@@ -52,17 +52,17 @@ pub fn run(task: &Task, place: &Place, session: &Session) -> Result<(), Error> {
 }
 
 /// Returns true if a task is done, by the present plan, and its results are still there.
-pub(super) fn is_done(known: Option<&TaskFile>, task: &Task, place: &Place) -> bool {
+pub(super) fn is_done(known: Option<&TaskFile>, task: &Task, place: &TaskFolders) -> bool {
     known.is_some_and(|known| was_done(known, task)) && lacking(task, place).is_none()
 }
 
 /// Returns true if a task's file says that all of it is done.
 pub(super) fn was_done(known: &TaskFile, task: &Task) -> bool {
-    known.state == State::Done && known.settings == task.settings() && known.asked == task.asked()
+    known.state == TaskState::Done && known.settings == task.settings() && known.asked == task.asked()
 }
 
 /// Returns the part of a finished task that is missing or not its own: the reason to redo it.
-pub(super) fn lacking(task: &Task, place: &Place) -> Option<String> {
+pub(super) fn lacking(task: &Task, place: &TaskFolders) -> Option<String> {
     let folder = place.folder(task);
     let audit = task.steps.audit.as_ref().map(|_| AUDIT_JSON);
     if let Some(name) =
@@ -85,10 +85,10 @@ pub(super) fn lacking(task: &Task, place: &Place) -> Option<String> {
 ///
 /// # Errors
 /// Returns an error if its selection of robots cannot be read.
-pub(crate) fn test_of(task: &Task, place: &Place) -> Result<Option<eval::Options>, Error> {
+pub(crate) fn test_of(task: &Task, place: &TaskFolders) -> Result<Option<eval::EvalOptions>, Error> {
     let Some(step) = &task.steps.eval else { return Ok(None) };
     let folder = place.folder(task);
-    Ok(Some(eval::Options {
+    Ok(Some(eval::EvalOptions {
         archives: vec![folder.join(RUN_JSON)],
         robots: selection("eval.robots", &step.robots)?.physical(step.physical_only),
         images: step.images,
@@ -103,13 +103,13 @@ pub(crate) fn test_of(task: &Task, place: &Place) -> Result<Option<eval::Options
 }
 
 /// Does the run and the steps after it, unless they are done.
-fn steps(task: &Task, place: &Place, session: &Session) -> Result<(), Error> {
+fn steps(task: &Task, place: &TaskFolders, session: &Session) -> Result<(), Error> {
     let folder = place.folder(task);
     let stopped =
         || Error::stopped("stopped; what is done so far is kept".to_string()).remedy(Remedy::Repeat);
     match &task.run {
         Run::Evolve(config, name, _) => {
-            let options = evolve::Options {
+            let options = evolve::EvolveOptions {
                 config: (**config).clone(),
                 name: name.clone(),
                 out: folder.clone(),
@@ -121,7 +121,7 @@ fn steps(task: &Task, place: &Place, session: &Session) -> Result<(), Error> {
             }
         }
         Run::Train(training) => {
-            let options = train::Options {
+            let options = train::TrainOptions {
                 archive: training.archive.clone(),
                 robots: selection("robots", &training.robots)?,
                 groups: training.groups.clone(),
@@ -144,13 +144,13 @@ fn steps(task: &Task, place: &Place, session: &Session) -> Result<(), Error> {
     if let Some(step) = &task.steps.audit {
         let robots = match selection("audit.robots", &step.robots)? {
             Selection::Validated(best) => {
-                let options = validation::Options { archive: archive.clone(), best: Some(best) };
+                let options = validation::ValidationOptions { archive: archive.clone(), best: Some(best) };
                 let found = validation::validate(&options, session)?.ok_or_else(stopped)?;
                 Selection::Ids(found.into_iter().map(|robot| robot.id).collect())
             }
             robots => robots,
         };
-        let options = audit::Options {
+        let options = audit::AuditOptions {
             archive: archive.clone(),
             robots,
             seed: 1,

@@ -36,7 +36,7 @@ pub enum Run {
     /// `evolve`, with the name of the run, and the groups of classes if the plan names them.
     Evolve(Box<Config>, String, Option<Groups>),
     /// `train`.
-    Train(Box<Training>),
+    Train(Box<TrainRun>),
 }
 
 impl Run {
@@ -59,7 +59,7 @@ impl Run {
 
 /// A training.
 #[derive(Clone, Debug)]
-pub struct Training {
+pub struct TrainRun {
     /// The run.json whose robots are trained.
     pub archive: PathBuf,
     /// SHA-256 of this file.
@@ -163,12 +163,12 @@ pub(crate) fn selection(key: &str, text: &str) -> Result<Selection, Error> {
 
 /// The place where tasks are done.
 #[derive(Clone, Debug)]
-pub struct Place {
+pub struct TaskFolders {
     /// Parent of all run folders.
     pub out: PathBuf,
 }
 
-impl Place {
+impl TaskFolders {
     /// Returns the run folder of a task.
     pub(crate) fn folder(&self, task: &Task) -> PathBuf {
         self.out.join(&task.name)
@@ -251,7 +251,7 @@ impl Task {
 ///
 /// # Errors
 /// Returns an error for each of them, with the keys that differ.
-pub fn check_folders(tasks: &[Task], place: &Place) -> Result<(), Vec<Error>> {
+pub fn check_folders(tasks: &[Task], place: &TaskFolders) -> Result<(), Vec<Error>> {
     let check = |(number, task): (usize, &Task)| {
         let path = place.folder(task).join(TASK_JSON);
         let of = |known: TaskFile| differing(&known.settings, &task.settings());

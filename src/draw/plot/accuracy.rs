@@ -3,7 +3,7 @@
 use crate::base::number;
 use crate::draw::colour;
 use crate::draw::plot::axes::{AXIS, Axis, MARGIN, Plot, heading_in_lines};
-use crate::draw::plot::canvas::{Canvas, Pen, TEXT, Words};
+use crate::draw::plot::canvas::{Canvas, Pen, TEXT, TextStyle};
 use crate::draw::plot::figure::{COLUMN, Figure};
 use crate::draw::{fonts, plot::scales};
 use crate::store::eval::{EvalFile, RobotReport};
@@ -37,7 +37,7 @@ pub fn accuracy(report: &EvalFile) -> Figure {
     let mut y = top;
     for task in &tasks {
         if tasks.len() > 1 {
-            canvas.fitted([left + 3.0, y + 9.0], task, size[0] - 3.0, Words::default().bold());
+            canvas.fitted([left + 3.0, y + 9.0], task, size[0] - 3.0, TextStyle::default().bold());
         }
         y += block_head + 3.0;
         let robots: Vec<&RobotReport> = report.robots.iter().filter(|robot| robot.task == *task).collect();
@@ -47,7 +47,7 @@ pub fn accuracy(report: &EvalFile) -> Figure {
             dot(&mut canvas, &plot, robot, y + line / 2.0, named);
             if named {
                 let at = [left - 4.0, y + line / 2.0 + 0.36 * TEXT];
-                canvas.fitted(at, &name(report, robot), 80.0, Words::end());
+                canvas.fitted(at, &name(report, robot), 80.0, TextStyle::end());
             }
             y += line;
         }
@@ -158,7 +158,7 @@ fn legend(canvas: &mut Canvas, report: &EvalFile, top: f64) -> f64 {
         if k == 0 {
             canvas.dot([at[0] + 7.0, at[1] - 2.6], 2.2, scales::BLUE);
         }
-        canvas.fitted([at[0] + 18.0, at[1]], text, column - 22.0, Words::default());
+        canvas.fitted([at[0] + 18.0, at[1]], text, column - 22.0, TextStyle::default());
     }
     top - 2.0 + 11.0 * lines.len().div_ceil(2) as f64
 }

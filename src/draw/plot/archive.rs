@@ -7,7 +7,7 @@ use crate::body::Material;
 use crate::draw::colour;
 use crate::draw::colour::Colour;
 use crate::draw::plot::axes::{Axis, MARGIN, colour_bar, heading};
-use crate::draw::plot::canvas::{Canvas, Pen, Piece, TEXT, Words};
+use crate::draw::plot::canvas::{Canvas, Pen, Piece, TEXT, TextStyle};
 use crate::draw::plot::figure::{COLUMN, Figure, PAGE};
 use crate::draw::plot::svg::number;
 use crate::draw::plot::{robot, scales};
@@ -48,7 +48,7 @@ pub fn archive(run: &RunFile) -> Figure {
         let x = MARGIN + LEFT + column as f64 * (side + LEFT + 4.0);
         let y = top + title + row as f64 * (map_height + 4.0);
         if tasks > 1 {
-            canvas.fitted([x, y - 4.0], &run.dimensions.tasks[task], side, Words::default().bold());
+            canvas.fitted([x, y - 4.0], &run.dimensions.tasks[task], side, TextStyle::default().bold());
         }
         let cell = |bins: [usize; 3]| {
             let mut cell = bins.to_vec();
@@ -64,7 +64,7 @@ pub fn archive(run: &RunFile) -> Figure {
     let height = if tasks == 1 {
         // A map's upper right half is empty: more muscles and sensors than voxels.
         legend(&mut canvas, [MARGIN + LEFT + 0.53 * side, top + 0.01 * side], 0.44 * side, &scale, true);
-        canvas.text([width / 2.0, maps + 3.0], &STRIPS.join(" "), Words::middle().colour(colour::FAINT));
+        canvas.text([width / 2.0, maps + 3.0], &STRIPS.join(" "), TextStyle::middle().colour(colour::FAINT));
         maps + 4.0
     } else if !tasks.is_multiple_of(columns) {
         let free = MARGIN + LEFT + (tasks % columns) as f64 * (side + LEFT + 4.0);
@@ -175,13 +175,13 @@ fn axes(canvas: &mut Canvas, [x, y]: [f64; 2], side: f64, run: &RunFile, is_firs
         canvas.line([x + at, y + side], [x + at, y + side + 2.5], pen);
         canvas.line([x - 2.5, y + side - at], [x, y + side - at], pen);
         if bin % every == 0 {
-            canvas.text([x + at, y + side + 10.0], &edge.to_string(), Words::middle());
-            canvas.text([x - 4.5, y + side - at + 0.36 * TEXT], &edge.to_string(), Words::end());
+            canvas.text([x + at, y + side + 10.0], &edge.to_string(), TextStyle::middle());
+            canvas.text([x - 4.5, y + side - at + 0.36 * TEXT], &edge.to_string(), TextStyle::end());
         }
     }
-    canvas.text([x + side / 2.0, y + side + 20.0], "muscle voxels", Words::middle());
+    canvas.text([x + side / 2.0, y + side + 20.0], "muscle voxels", TextStyle::middle());
     if is_first {
-        let words = Words { upwards: true, ..Words::middle() };
+        let words = TextStyle { upwards: true, ..TextStyle::middle() };
         canvas.text([x - LEFT + 8.0, y + side / 2.0], "sensor voxels", words);
     }
 }
@@ -204,7 +204,7 @@ fn legend(canvas: &mut Canvas, [x, y]: [f64; 2], width: f64, scale: &Scale, is_a
     }
     if !is_above {
         for (k, text) in STRIPS.into_iter().enumerate() {
-            canvas.fitted([x, below + 6.0 + 9.5 * k as f64], text, width + 10.0, Words::default());
+            canvas.fitted([x, below + 6.0 + 9.5 * k as f64], text, width + 10.0, TextStyle::default());
         }
     }
 }

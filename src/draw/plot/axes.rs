@@ -3,7 +3,7 @@
 use crate::base::number;
 use crate::draw::colour;
 use crate::draw::colour::Colour;
-use crate::draw::plot::canvas::{Canvas, HEADING, Pen, TEXT, Words};
+use crate::draw::plot::canvas::{Canvas, HEADING, Pen, TEXT, TextStyle};
 use crate::draw::{fonts, plot::scales};
 
 /// Line of an axis, points.
@@ -132,12 +132,12 @@ impl Plot {
             let x = self.place([tick, self.y.from])[0];
             canvas.line([x, bottom], [x, bottom + TICK], pen);
             if name.is_some() {
-                canvas.text([x, bottom + TICK + GAP + 0.72 * TEXT], &self.x.label(tick), Words::middle());
+                canvas.text([x, bottom + TICK + GAP + 0.72 * TEXT], &self.x.label(tick), TextStyle::middle());
             }
         }
         if let Some(name) = name {
             let middle = self.at[0] + self.size[0] / 2.0;
-            canvas.text([middle, bottom + AXIS - 2.0], name, Words::middle());
+            canvas.text([middle, bottom + AXIS - 2.0], name, TextStyle::middle());
         }
     }
 
@@ -154,10 +154,10 @@ impl Plot {
         for tick in self.y.ticks() {
             let y = self.place([self.x.from, tick])[1];
             canvas.line([left - TICK, y], [left, y], pen);
-            canvas.text([left - TICK - GAP, y + 0.36 * TEXT], &self.y.label(tick), Words::end());
+            canvas.text([left - TICK - GAP, y + 0.36 * TEXT], &self.y.label(tick), TextStyle::end());
         }
         let x = left - TICK - GAP - labels - 4.0;
-        let words = Words { upwards: true, ..Words::middle() };
+        let words = TextStyle { upwards: true, ..TextStyle::middle() };
         canvas.text([x, top + self.size[1] / 2.0], name, words);
     }
 }
@@ -179,11 +179,16 @@ pub fn heading(canvas: &mut Canvas, title: &str, of: &str, width: f64) -> f64 {
 pub fn heading_in_lines(canvas: &mut Canvas, title: &str, of: &str, width: f64, count: usize) -> f64 {
     const LINE: f64 = 9.5;
     let most = width - 2.0 * MARGIN;
-    canvas.fitted([MARGIN, MARGIN + 7.0], title, most, Words { size: HEADING, ..Words::default() }.bold());
+    canvas.fitted(
+        [MARGIN, MARGIN + 7.0],
+        title,
+        most,
+        TextStyle { size: HEADING, ..TextStyle::default() }.bold(),
+    );
     let lines = fonts::lines(of, TEXT, false, most, count);
     for (k, line) in lines.iter().enumerate() {
         let at = [MARGIN, MARGIN + 17.0 + LINE * k as f64];
-        canvas.text(at, line, Words::default().colour(colour::FAINT));
+        canvas.text(at, line, TextStyle::default().colour(colour::FAINT));
     }
     MARGIN + 24.0 + LINE * (lines.len() - 1) as f64
 }
@@ -201,7 +206,7 @@ pub fn colour_bar(
     colour_of: impl Fn(f64) -> Colour,
 ) {
     const STEPS: u32 = 64;
-    canvas.text([x, y - 3.0], name, Words::default());
+    canvas.text([x, y - 3.0], name, TextStyle::default());
     let size = [width, 6.0];
     for k in 0..STEPS {
         let share = |k: u32| f64::from(k) / f64::from(STEPS);
@@ -216,7 +221,7 @@ pub fn colour_bar(
     for tick in axis.ticks() {
         let at = x + width * axis.share(tick);
         canvas.line([at, y + size[1]], [at, y + size[1] + TICK], pen);
-        canvas.text([at, y + size[1] + TICK + GAP + 0.72 * TEXT], &axis.label(tick), Words::middle());
+        canvas.text([at, y + size[1] + TICK + GAP + 0.72 * TEXT], &axis.label(tick), TextStyle::middle());
     }
 }
 

@@ -6,7 +6,7 @@ use crate::draw::colour;
 use crate::draw::colour::Colour;
 use crate::draw::panel::present;
 use crate::draw::plot::axes::{MARGIN, heading};
-use crate::draw::plot::canvas::{Canvas, Pen, Words};
+use crate::draw::plot::canvas::{Canvas, Pen, TextStyle};
 use crate::draw::plot::figure::{COLUMN, Figure};
 use crate::draw::plot::{robot, scales};
 
@@ -41,7 +41,7 @@ pub fn body(body: &Body, of: &str) -> Figure {
         COLUMN - MARGIN - x,
     );
     let counts = body.counts();
-    let faint = Words::default().colour(colour::FAINT);
+    let faint = TextStyle::default().colour(colour::FAINT);
     let notes = [
         format!("{} × {} grid,", body.height(), body.width()),
         format!("{},", counted(counts.total, "voxel", "voxels")),

@@ -27,7 +27,7 @@ pub enum Anchor {
 
 /// The style of a text.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Words {
+pub struct TextStyle {
     pub size: f64,
     pub bold: bool,
     pub colour: Colour,
@@ -36,31 +36,31 @@ pub struct Words {
     pub upwards: bool,
 }
 
-impl Default for Words {
+impl Default for TextStyle {
     fn default() -> Self {
-        Words { size: TEXT, bold: false, colour: colour::INK, anchor: Anchor::Start, upwards: false }
+        TextStyle { size: TEXT, bold: false, colour: colour::INK, anchor: Anchor::Start, upwards: false }
     }
 }
 
-impl Words {
+impl TextStyle {
     /// Returns the default style, anchored in the middle.
     pub fn middle() -> Self {
-        Words { anchor: Anchor::Middle, ..Words::default() }
+        TextStyle { anchor: Anchor::Middle, ..TextStyle::default() }
     }
 
     /// Returns the default style, anchored at the right end.
     pub fn end() -> Self {
-        Words { anchor: Anchor::End, ..Words::default() }
+        TextStyle { anchor: Anchor::End, ..TextStyle::default() }
     }
 
     /// Sets the colour.
     pub fn colour(self, colour: Colour) -> Self {
-        Words { colour, ..self }
+        TextStyle { colour, ..self }
     }
 
     /// Makes the text bold.
     pub fn bold(self) -> Self {
-        Words { bold: true, ..self }
+        TextStyle { bold: true, ..self }
     }
 }
 
@@ -104,7 +104,7 @@ pub(super) enum Element {
     Text {
         at: [f64; 2],
         text: String,
-        words: Words,
+        words: TextStyle,
     },
     /// Drawn with an opacity as a whole.
     Faded {
@@ -206,13 +206,13 @@ impl Canvas {
     }
 
     /// Draws a text on its baseline, shortened to what any figure has room for.
-    pub fn text(&mut self, at: [f64; 2], text: &str, words: Words) {
+    pub fn text(&mut self, at: [f64; 2], text: &str, words: TextStyle) {
         let text = shortened(text, MOST).chars().map(printable).collect();
         self.elements.push(Element::Text { at, text, words });
     }
 
     /// Draws a text, cut to fit into `most` points.
-    pub fn fitted(&mut self, at: [f64; 2], text: &str, most: f64, words: Words) {
+    pub fn fitted(&mut self, at: [f64; 2], text: &str, most: f64, words: TextStyle) {
         self.text(at, &fonts::fitted(text, words.size, words.bold, most), words);
     }
 

@@ -4,7 +4,7 @@
 use crate::baseline::curve::Crossing;
 use crate::draw::colour;
 use crate::draw::plot::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};
-use crate::draw::plot::canvas::{Anchor, Canvas, Pen, Words};
+use crate::draw::plot::canvas::{Anchor, Canvas, Pen, TextStyle};
 use crate::draw::plot::figure::{COLUMN, Figure, PAGE};
 use crate::draw::{fonts, plot::scales};
 use crate::store::capacity::{CapacityFile, Curve, Point, TaskCapacity};
@@ -80,11 +80,11 @@ fn panel(canvas: &mut Canvas, at: [f64; 2], size: [f64; 2], y: &Axis, task: &Tas
         None => ("no capacity: the curve never reaches the robots".to_string(), None),
     };
     // Half of the room is for the words beside the title.
-    let title = fonts::fitted(&task.task, Words::default().size, true, 0.4 * size[0]);
+    let title = fonts::fitted(&task.task, TextStyle::default().size, true, 0.4 * size[0]);
     let title = format!("{title}, {kind}");
-    canvas.text([at[0], at[1] - 5.0], &title, Words::default().bold());
-    let left = fonts::width(&title, Words::default().size, true) + 6.0;
-    canvas.fitted([at[0] + left, at[1] - 5.0], &found, size[0] - left, Words::default());
+    canvas.text([at[0], at[1] - 5.0], &title, TextStyle::default().bold());
+    let left = fonts::width(&title, TextStyle::default().size, true) + 6.0;
+    canvas.fitted([at[0] + left, at[1] - 5.0], &found, size[0] - left, TextStyle::default());
     plot.grid(canvas, true, false);
     canvas.clipped(at, size, |canvas| {
         for point in &curve.points {
@@ -120,7 +120,7 @@ fn legend(canvas: &mut Canvas, trainings: usize, [x, top]: [f64; 2], width: f64)
     ];
     let [mut at, mut y] = [x, top + 6.0];
     for (k, (pen, text)) in lines.iter().enumerate() {
-        let words = Words { anchor: Anchor::Start, ..Words::default() };
+        let words = TextStyle { anchor: Anchor::Start, ..TextStyle::default() };
         let wide = 17.0 + fonts::width(text, words.size, false) + 12.0;
         if at > x && at + wide > width - MARGIN {
             (at, y) = (x, y + 11.0);

@@ -143,12 +143,12 @@ fn encode_png(pixmap: &Pixmap, scale: f64, background: Background) -> Result<Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::draw::plot::canvas::Words;
+    use crate::draw::plot::canvas::TextStyle;
 
     fn figure() -> Figure {
         let mut canvas = Canvas::new();
         canvas.rectangle([10.0, 10.0], [20.0, 10.0], colour::INK);
-        canvas.text([5.0, 40.0], "a < b & c", Words::default());
+        canvas.text([5.0, 40.0], "a < b & c", TextStyle::default());
         Figure::new("A \"test\" <1>", [60.0, 50.0], canvas)
     }
 

@@ -1,7 +1,7 @@
 //! Renders a [`Canvas`] to pixels.
 
 use crate::draw::fonts;
-use crate::draw::plot::canvas::{Anchor, Canvas, Element, Ink, Pen, Piece, Words, drawable};
+use crate::draw::plot::canvas::{Anchor, Canvas, Element, Ink, Pen, Piece, TextStyle, drawable};
 use crate::draw::raster::paint;
 use tiny_skia::{
     FillRule, FilterQuality, LineJoin, Paint, Path, PathBuilder, Pattern, Pixmap, Rect, SpreadMode, Stroke,
@@ -92,7 +92,7 @@ fn inked(pixmap: &mut Pixmap, path: &Path, ink: &Ink, line_join: LineJoin, to_pi
     }
 }
 
-fn lettered(pixmap: &mut Pixmap, at: [f64; 2], text: &str, words: &Words, to_pixels: Transform) {
+fn lettered(pixmap: &mut Pixmap, at: [f64; 2], text: &str, words: &TextStyle, to_pixels: Transform) {
     let (letters, width) = fonts::letters(text, words.size, words.bold);
     let before = match words.anchor {
         Anchor::Start => 0.0,

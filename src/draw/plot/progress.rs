@@ -1,10 +1,10 @@
 //! The figure of a run's progress: QD score, coverage and best fitness over evaluations.
 
-use crate::analysis::progress::{Group, Progress, alike};
+use crate::analysis::progress::{Progress, SettingsGroup, alike};
 use crate::draw::colour;
 use crate::draw::colour::Colour;
 use crate::draw::plot::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};
-use crate::draw::plot::canvas::{Canvas, Pen, Piece, TEXT, Words};
+use crate::draw::plot::canvas::{Canvas, Pen, Piece, TEXT, TextStyle};
 use crate::draw::plot::figure::{COLUMN, Figure};
 use crate::draw::plot::scales;
 use crate::store::metrics::Moment;
@@ -44,7 +44,7 @@ pub fn progress(runs: &[Progress]) -> Figure {
     let panels: Vec<(Quantity, Vec<Vec<Band>>, Axis)> = QUANTITIES
         .into_iter()
         .map(|quantity| {
-            let of = |(group, end): (&Group, &f64)| bands(&group.runs, quantity.1, *end);
+            let of = |(group, end): (&SettingsGroup, &f64)| bands(&group.runs, quantity.1, *end);
             let bands: Vec<Vec<Band>> = groups.iter().zip(&ends).map(of).collect();
             let all = || bands.iter().flatten();
             let values = || all().flat_map(|band| [band.low, band.high]).filter(|v| v.is_finite());
@@ -69,7 +69,7 @@ pub fn progress(runs: &[Progress]) -> Figure {
         top += PANEL + 9.0;
     }
     let mut height = top - 9.0 + AXIS + MARGIN;
-    let note = Words { size: TEXT, ..Words::end() }.colour(colour::FAINT);
+    let note = TextStyle { size: TEXT, ..TextStyle::end() }.colour(colour::FAINT);
     if let Some(unit) =
         runs.first().and_then(|run| run.unit).filter(|unit| runs.iter().all(|run| run.unit == Some(unit)))
     {
@@ -82,7 +82,7 @@ pub fn progress(runs: &[Progress]) -> Figure {
 }
 
 /// Returns the evaluations that all runs of a group reach.
-fn end(group: &Group) -> f64 {
+fn end(group: &SettingsGroup) -> f64 {
     let of = |run: &&Progress| run.moments.last().map_or(0.0, |moment| moment.evaluations);
     let shortest = group.runs.iter().map(of).fold(f64::INFINITY, f64::min);
     if shortest.is_finite() { shortest } else { 0.0 }
@@ -99,7 +99,7 @@ fn pen(number: usize) -> Pen {
 }
 
 /// Draws the legend; returns the y below.
-fn legend(canvas: &mut Canvas, groups: &[Group], top: f64) -> f64 {
+fn legend(canvas: &mut Canvas, groups: &[SettingsGroup], top: f64) -> f64 {
     let mut y = top;
     for (number, group) in groups.iter().enumerate().take(NAMED) {
         y += 10.0;
@@ -109,13 +109,13 @@ fn legend(canvas: &mut Canvas, groups: &[Group], top: f64) -> f64 {
             count => format!("{count} seeds"),
         };
         let text = format!("{} ({seeds})", group.label);
-        canvas.fitted([MARGIN + 22.0, y], &text, COLUMN - 2.0 * MARGIN - 22.0, Words::default());
+        canvas.fitted([MARGIN + 22.0, y], &text, COLUMN - 2.0 * MARGIN - 22.0, TextStyle::default());
     }
     if groups.len() > NAMED {
         y += 10.0;
         canvas.line([MARGIN + 4.0, y - 2.6], [MARGIN + 18.0, y - 2.6], pen(NAMED));
         let text = format!("and {} more", groups.len() - NAMED);
-        canvas.text([MARGIN + 22.0, y], &text, Words::default().colour(colour::FAINT));
+        canvas.text([MARGIN + 22.0, y], &text, TextStyle::default().colour(colour::FAINT));
     }
     y
 }

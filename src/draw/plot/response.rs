@@ -6,7 +6,7 @@ use crate::draw::colour;
 use crate::draw::colour::Colour;
 use crate::draw::panel::present;
 use crate::draw::plot::axes::{Axis, MARGIN, colour_bar, heading};
-use crate::draw::plot::canvas::{Canvas, Pen, Piece, Words};
+use crate::draw::plot::canvas::{Canvas, Pen, Piece, TextStyle};
 use crate::draw::plot::figure::{COLUMN, Figure};
 use crate::draw::plot::{robot, scales};
 use crate::store::response::{EndedBy, RobotResponse};
@@ -63,10 +63,10 @@ pub fn response(found: &RobotResponse, task: Option<&str>, of: &str) -> Figure {
     let mut y = robot::legend(&mut canvas, [x, top], lines, room);
     canvas.frame([x, y], [7.0, 7.0], Pen::new(scales::CELL, 0.4));
     canvas.path(cross([x, y], 7.0).to_vec(), uncertain);
-    canvas.fitted([x + 10.5, y + 6.2], "within 2 errors of 0", room - 10.5, Words::default());
+    canvas.fitted([x + 10.5, y + 6.2], "within 2 errors of 0", room - 10.5, TextStyle::default());
     y += 24.0;
     for note in notes(found, task) {
-        canvas.fitted([x, y], &note, room, Words::default().colour(colour::FAINT));
+        canvas.fitted([x, y], &note, room, TextStyle::default().colour(colour::FAINT));
         y += 10.0;
     }
 
@@ -118,11 +118,12 @@ fn faded(fill: Colour) -> Colour {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::store::response::{Place, Taught};
+    use crate::store::response::{ResponsePlace, TrainingEstimate};
 
     fn found(slopes: [(f64, f64); 3]) -> RobotResponse {
         let places = slopes.into_iter().enumerate();
-        let place = |(column, (slope, error)): (usize, (f64, f64))| Place { row: 0, column, slope, error };
+        let place =
+            |(column, (slope, error)): (usize, (f64, f64))| ResponsePlace { row: 0, column, slope, error };
         RobotResponse {
             displacements: vec![Some(1.0); 60],
             id: "a".to_string(),
@@ -165,7 +166,7 @@ mod tests {
         let svg = response(&still, Some("4|9"), "robot a").svg();
         assert!(svg.contains(&scales::diverging(0.0).hex()) && !svg.contains("4|9"));
         let interval = [0.612, 0.748];
-        still.taught = Some(Taught {
+        still.taught = Some(TrainingEstimate {
             fitness: 0.4,
             fitness_interval: interval,
             accuracy: 0.68,

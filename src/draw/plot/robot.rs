@@ -4,7 +4,7 @@ use crate::base::Grid;
 use crate::body::{Body, Material};
 use crate::draw::colour;
 use crate::draw::colour::Colour;
-use crate::draw::plot::canvas::{Canvas, Pen, Piece, Words};
+use crate::draw::plot::canvas::{Canvas, Pen, Piece, TextStyle};
 use crate::draw::plot::scales;
 use crate::draw::walk::{Walk, area};
 use std::collections::BTreeMap;
@@ -164,7 +164,7 @@ pub fn legend<'a>(
         canvas.rectangle([x, top], [7.0, 7.0], fill);
         marks(canvas, [x, top], 7.0, std::iter::once(((0, 0), material)), |_| fill);
         canvas.frame([x, top], [7.0, 7.0], Pen::new(scales::CELL, 0.4));
-        canvas.fitted([x + 10.5, top + 6.2], text, most - 10.5, Words::default());
+        canvas.fitted([x + 10.5, top + 6.2], text, most - 10.5, TextStyle::default());
         top += LINE;
     }
     top

@@ -4,7 +4,7 @@ use crate::draw::colour;
 use crate::draw::error::PictureError;
 use crate::draw::panel::signed;
 use crate::draw::plot::axes::{Axis, MARGIN, Plot, heading};
-use crate::draw::plot::canvas::{Canvas, Pen, TEXT, Words};
+use crate::draw::plot::canvas::{Canvas, Pen, TEXT, TextStyle};
 use crate::draw::plot::figure::{COLUMN, Figure, PAGE};
 use crate::draw::plot::robot;
 use crate::draw::walk::Walk;
@@ -51,7 +51,7 @@ pub fn snapshots(recording: &Recording, every: usize, of: &str) -> Result<Figure
         let label = &recording.phases[phase].seen.label;
         let d = signed(recording.phases[phase].displacement);
         let text = format!("{label}: {d} voxel lengths");
-        canvas.fitted([at[0] + STIMULUS + 8.0, at[1] + 7.0], &text, plot_width, Words::default().bold());
+        canvas.fitted([at[0] + STIMULUS + 8.0, at[1] + 7.0], &text, plot_width, TextStyle::default().bold());
         robot::stimulus(&mut canvas, [at[0], at[1] + 1.0], STIMULUS, &recording.phases[phase].seen.stimulus);
         let plot = Plot {
             at: [at[0] + STIMULUS + 8.0, at[1] + panel_height - 12.0 - high],
@@ -63,7 +63,7 @@ pub fn snapshots(recording: &Recording, every: usize, of: &str) -> Result<Figure
     }
     let below = top + phases.div_ceil(columns) as f64 * (panel_height + GAP);
     let note = if recording.unstable { "ended early: unstable" } else { "x [voxel lengths] from the start" };
-    canvas.text([width / 2.0, below + 2.0], note, Words::middle());
+    canvas.text([width / 2.0, below + 2.0], note, TextStyle::middle());
     Ok(Figure::new(&format!("Snapshots: {of}"), [width, below + 4.0 + MARGIN], canvas))
 }
 
@@ -124,7 +124,7 @@ fn panel(canvas: &mut Canvas, walk: &Walk, phase: usize, every: usize, plot: &Pl
         canvas.line([x, bottom], [x, bottom + 2.5], Pen::new(colour::GROUND_LINE, 0.6));
         // Leaves out numbers that would extend beyond the panel.
         if (left + 4.0..left + plot.size[0] - 4.0).contains(&x) {
-            canvas.text([x, bottom + 4.0 + 0.72 * TEXT], &plot.x.label(tick), Words::middle());
+            canvas.text([x, bottom + 4.0 + 0.72 * TEXT], &plot.x.label(tick), TextStyle::middle());
         }
     }
 }

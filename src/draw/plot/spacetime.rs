@@ -5,7 +5,7 @@ use crate::draw::colour::Colour;
 use crate::draw::error::PictureError;
 use crate::draw::panel::signed;
 use crate::draw::plot::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};
-use crate::draw::plot::canvas::{Canvas, Pen, Piece, TEXT, Words};
+use crate::draw::plot::canvas::{Canvas, Pen, Piece, TEXT, TextStyle};
 use crate::draw::plot::figure::{COLUMN, Figure, PAGE};
 use crate::draw::plot::robot;
 use crate::draw::walk::{Walk, area};
@@ -187,20 +187,20 @@ fn stimuli(canvas: &mut Canvas, walk: &Walk, rollout: &Range<usize>, plot: &Plot
             }
             if room >= STIMULUS + 18.0 {
                 let name = phase.seen.label.split(' ').next().expect("a split text has a first piece");
-                canvas.fitted([at[0], at[1] + STIMULUS + 8.0], name, STIMULUS, Words::default().bold());
+                canvas.fitted([at[0], at[1] + STIMULUS + 8.0], name, STIMULUS, TextStyle::default().bold());
                 canvas.fitted(
                     [at[0], at[1] + STIMULUS + 17.0],
                     &signed(phase.displacement),
                     STIMULUS,
-                    Words::default(),
+                    TextStyle::default(),
                 );
             }
         } else {
             let size = robot::stimulus(canvas, [left, top - STIMULUS - 4.0], STIMULUS, &phase.seen.stimulus);
             let x = left + size[0] + 4.0;
             let most = plot.size[0] - size[0] - 4.0;
-            canvas.fitted([x, top - STIMULUS + 4.0], &phase.seen.label, most, Words::default().bold());
-            canvas.fitted([x, top - STIMULUS + 14.0], &words, most, Words::default());
+            canvas.fitted([x, top - STIMULUS + 4.0], &phase.seen.label, most, TextStyle::default().bold());
+            canvas.fitted([x, top - STIMULUS + 14.0], &words, most, TextStyle::default());
         }
     }
 }
@@ -214,12 +214,12 @@ fn axes(canvas: &mut Canvas, plot: &Plot, is_first: bool) {
         let y = moment(plot, tick);
         canvas.line([left - 2.5, y], [left, y], pen);
         if is_first {
-            canvas.text([left - 4.5, y + 0.36 * TEXT], &plot.y.label(tick), Words::end());
+            canvas.text([left - 4.5, y + 0.36 * TEXT], &plot.y.label(tick), TextStyle::end());
         }
     }
     if is_first {
         let x = left - 8.5 - plot.y.labels_width();
-        let words = Words { upwards: true, ..Words::middle() };
+        let words = TextStyle { upwards: true, ..TextStyle::middle() };
         canvas.text([x, top + plot.size[1] / 2.0], "time [actuation cycles]", words);
     }
 }

@@ -141,7 +141,7 @@ fn opacity(name: &str, colour: Colour) -> String {
 mod tests {
     use super::*;
     use crate::draw::colour;
-    use crate::draw::plot::canvas::Words;
+    use crate::draw::plot::canvas::TextStyle;
 
     #[test]
     fn every_element_has_its_svg() {
@@ -157,9 +157,9 @@ mod tests {
         canvas
             .area(vec![square, level, Piece::Polygon(vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])], colour::INK);
         canvas.dot([1.0, 2.0], 3.0, colour::INK);
-        canvas.text([1.0, 2.0], "a\n&", Words { upwards: true, ..Words::middle() }.bold());
+        canvas.text([1.0, 2.0], "a\n&", TextStyle { upwards: true, ..TextStyle::middle() }.bold());
         canvas.clipped([1.0, 2.0], [3.0, 4.0], |canvas| {
-            canvas.faded(0.25, |canvas| canvas.text([1.0, 2.0], "b", Words::end()));
+            canvas.faded(0.25, |canvas| canvas.text([1.0, 2.0], "b", TextStyle::end()));
         });
         let expected = r##"<rect x="1" y="2" width="3" height="4.5" fill="#ffffff"/>
 <rect x="1" y="2" width="3" height="4" fill="none" stroke="#222428" stroke-opacity="0.2" stroke-width="0.5" stroke-dasharray="3 2"/>

@@ -1,9 +1,9 @@
 //! The figure of a sweep: accuracy by the varied settings, a dot per seed.
 
-use crate::analysis::sweep::Row;
+use crate::analysis::sweep::SweepRow;
 use crate::draw::colour;
 use crate::draw::plot::axes::{AXIS, Axis, MARGIN, Plot, heading};
-use crate::draw::plot::canvas::{Canvas, Pen, TEXT, Words};
+use crate::draw::plot::canvas::{Canvas, Pen, TEXT, TextStyle};
 use crate::draw::plot::figure::{COLUMN, Figure};
 use crate::draw::{fonts, plot::scales};
 
@@ -21,7 +21,7 @@ struct Line {
 
 /// Plots accuracy on held-out images by the varied settings: a dot per seed with its 95 % interval,
 /// the mean of several seeds, a line per task. Returns `None` if no run was tested.
-pub fn sweep(name: &str, rows: &[Row]) -> Option<Figure> {
+pub fn sweep(name: &str, rows: &[SweepRow]) -> Option<Figure> {
     let mut lines: Vec<Line> = Vec::new();
     let mut images = None;
     for row in rows {
@@ -51,7 +51,7 @@ pub fn sweep(name: &str, rows: &[Row]) -> Option<Figure> {
     let at = |value: f64| plot.place([value, 0.0])[0];
     for (number, line) in lines.iter().enumerate() {
         let y = top + 2.0 + LINE * (number as f64 + 0.5);
-        canvas.fitted([left - 4.0, y + 0.36 * TEXT], &line.about, MOST, Words::end());
+        canvas.fitted([left - 4.0, y + 0.36 * TEXT], &line.about, MOST, TextStyle::end());
         for (accuracy, interval) in &line.dots {
             if let Some([low, high]) = interval {
                 canvas.line([at(*low), y], [at(*high), y], Pen::new(scales::BLUE, 0.8));
@@ -68,7 +68,7 @@ pub fn sweep(name: &str, rows: &[Row]) -> Option<Figure> {
     let mut height = top + size[1] + AXIS + MARGIN;
     if lines.iter().any(|line| line.dots.len() > 1) {
         height += 9.0;
-        let words = Words::default().colour(colour::FAINT);
+        let words = TextStyle::default().colour(colour::FAINT);
         canvas.text(
             [MARGIN, height - MARGIN - 2.0],
             "dots: seeds, with 95 % intervals; bars: their mean",
@@ -79,7 +79,7 @@ pub fn sweep(name: &str, rows: &[Row]) -> Option<Figure> {
 }
 
 /// Describes a run without its seed.
-fn about(row: &Row, recognises: &str) -> String {
+fn about(row: &SweepRow, recognises: &str) -> String {
     let word = |(key, value): &(String, String)| match key.as_str() {
         "seed" | "groups" => None,
         key => Some(format!("{}={value}", key.rsplit('.').next().unwrap_or(key))),

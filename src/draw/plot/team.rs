@@ -6,7 +6,7 @@ use crate::draw::colour;
 use crate::draw::colour::Colour;
 use crate::draw::fonts;
 use crate::draw::plot::axes::{MARGIN, heading};
-use crate::draw::plot::canvas::{Canvas, Pen, TEXT, Words};
+use crate::draw::plot::canvas::{Canvas, Pen, TEXT, TextStyle};
 use crate::draw::plot::figure::{COLUMN, Figure, PAGE};
 use crate::draw::plot::{robot, scales};
 use crate::store::team::{Member, TeamFile};
@@ -47,18 +47,18 @@ pub fn confusion(file: &TeamFile) -> Option<Figure> {
     let has_numbers = numbers <= side && TEXT <= side;
     let top = heading(&mut canvas, "Answers of the team", &of, width) + 8.0 + 2.0 * TEXT;
     let middle = left + side * count as f64 / 2.0;
-    canvas.text([middle, top - 1.7 * TEXT], "answer", Words::middle());
+    canvas.text([middle, top - 1.7 * TEXT], "answer", TextStyle::middle());
     let at = [MARGIN + TEXT, top + side * count as f64 / 2.0];
-    canvas.text(at, "class", Words { upwards: true, ..Words::middle() });
+    canvas.text(at, "class", TextStyle { upwards: true, ..TextStyle::middle() });
     for (row, class) in file.classes.iter().enumerate() {
         let of_class: usize = votes.confusion[row].iter().sum();
         let name = class.to_string();
         let y = top + side * row as f64;
         if row % every_row == 0 {
-            canvas.text([left - 3.0, y + side / 2.0 + 0.36 * TEXT], &name, Words::end());
+            canvas.text([left - 3.0, y + side / 2.0 + 0.36 * TEXT], &name, TextStyle::end());
         }
         if row % every_column == 0 {
-            canvas.text([left + side * (row as f64 + 0.5), top - 3.0], &name, Words::middle());
+            canvas.text([left + side * (row as f64 + 0.5), top - 3.0], &name, TextStyle::middle());
         }
         for (column, images) in votes.confusion[row].iter().enumerate() {
             let x = left + side * column as f64;
@@ -72,7 +72,7 @@ pub fn confusion(file: &TeamFile) -> Option<Figure> {
             if *images > 0 && has_numbers {
                 let ink = if share > 0.6 { colour::INK } else { colour::PAPER };
                 let at = [x + side / 2.0, y + side / 2.0 + 0.36 * TEXT];
-                canvas.text(at, &images.to_string(), Words::middle().colour(ink));
+                canvas.text(at, &images.to_string(), TextStyle::middle().colour(ink));
             }
         }
     }
@@ -165,13 +165,13 @@ fn drawn(canvas: &mut Canvas, at: [f64; 2], side: f64, body: &Body) {
 
 /// Writes the classes that a robot tells apart by walking left or right, and its accuracy.
 fn caption(canvas: &mut Canvas, [middle, y]: [f64; 2], most: f64, member: &Member) {
-    canvas.text([middle, y + 7.5], &ways(member, most + GAP), Words::middle());
+    canvas.text([middle, y + 7.5], &ways(member, most + GAP), TextStyle::middle());
     let accuracy = format!("{} %", percent(member.own.accuracy));
     canvas.fitted(
         [middle, y + 15.0],
         &accuracy,
         most,
-        Words { size: 6.2, ..Words::middle() }.colour(colour::FAINT),
+        TextStyle { size: 6.2, ..TextStyle::middle() }.colour(colour::FAINT),
     );
 }
 
