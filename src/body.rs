@@ -4,7 +4,7 @@ use crate::base::hash;
 pub use morphcog_sim::body::*;
 
 /// Returns the content hash of a body: equal bodies, and only those, have equal keys.
-pub fn key(body: &Body) -> [u8; 16] {
+pub(crate) fn key(body: &Body) -> [u8; 16] {
     hash::content_key(body.to_string().as_bytes())
 }
 

@@ -63,7 +63,7 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// Returns an error whose kind sets the exit code.
-pub fn run(cli: Cli, console: &Console, ranks: Ranks) -> Result<(), Error> {
+pub(crate) fn run(cli: Cli, console: &Console, ranks: Ranks) -> Result<(), Error> {
     let _environment = FloatEnvironment::standard();
     InstructionSet::asked().map_err(|text| Error::usage(text).advice("or leave it unset"))?;
     threads::check_environment()?;

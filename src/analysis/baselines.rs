@@ -7,35 +7,35 @@ use crate::task::grouping::ClassSplit;
 
 /// An image as the sensors see it, with its class.
 #[derive(Clone, Copy, Debug)]
-pub struct LabelledImage<'a> {
+pub(crate) struct LabelledImage<'a> {
     /// H × W in [0, 1].
-    pub stimulus: &'a Grid<f64>,
+    pub(crate) stimulus: &'a Grid<f64>,
     /// Its class.
-    pub class: u8,
+    pub(crate) class: u8,
 }
 
 /// A classifier by one pixel: above its threshold one group, else the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PixelRule {
+pub(crate) struct PixelRule {
     /// Its row.
-    pub row: usize,
+    pub(crate) row: usize,
     /// Its column.
-    pub column: usize,
+    pub(crate) column: usize,
     /// The threshold, in [0, 1].
-    pub level: f64,
+    pub(crate) level: f64,
     /// The answer for pixels above the threshold.
-    pub above: Group,
+    pub(crate) above: Group,
 }
 
 /// Returns the accuracy of always answering with the larger group.
-pub fn larger_group(split: &ClassSplit, images: &[LabelledImage]) -> f64 {
+pub(crate) fn larger_group(split: &ClassSplit, images: &[LabelledImage]) -> f64 {
     let a = images.iter().filter(|image| split.group(image.class) == Some(Group::A)).count();
     a.max(images.len() - a) as f64 / images.len().max(1) as f64
 }
 
 /// Returns the pixel and threshold that best separate the groups; the first in reading order wins a
 /// tie. Returns `None` without images.
-pub fn best_pixel(split: &ClassSplit, images: &[LabelledImage]) -> Option<PixelRule> {
+pub(crate) fn best_pixel(split: &ClassSplit, images: &[LabelledImage]) -> Option<PixelRule> {
     let first = images.first()?.stimulus;
     let total_a = images.iter().filter(|image| split.group(image.class) == Some(Group::A)).count();
     let mut best: Option<(usize, PixelRule)> = None;
@@ -69,7 +69,7 @@ pub fn best_pixel(split: &ClassSplit, images: &[LabelledImage]) -> Option<PixelR
 
 impl PixelRule {
     /// Returns the fraction of images it answers correctly.
-    pub fn accuracy(&self, split: &ClassSplit, images: &[LabelledImage]) -> f64 {
+    pub(crate) fn accuracy(&self, split: &ClassSplit, images: &[LabelledImage]) -> f64 {
         let answer = |image: &LabelledImage| {
             let value = image.stimulus.or_default((self.row, self.column));
             if (value > self.level) == (self.above == Group::A) { Group::A } else { Group::B }
@@ -79,7 +79,7 @@ impl PixelRule {
 }
 
 /// Returns the accuracy of answering with the group of the [`nearest`] training image.
-pub fn nearest_training_image(
+pub(crate) fn nearest_training_image(
     split: &ClassSplit,
     training: &[LabelledImage],
     images: &[LabelledImage],

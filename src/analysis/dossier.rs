@@ -30,30 +30,30 @@ const MOST_IMAGES: usize = 4;
 
 /// All results of a run.
 #[derive(Clone, Debug)]
-pub struct Dossier {
+pub(crate) struct Dossier {
     /// Its run.json.
-    pub path: PathBuf,
+    pub(crate) path: PathBuf,
     /// Number of earlier runs with its name and seed; `None` if it is the only one.
-    pub namesake: Option<usize>,
+    pub(crate) namesake: Option<usize>,
     /// The run.
-    pub run: RunFile,
+    pub(crate) run: RunFile,
     /// Its progress; `None` without a metrics.csv.
-    pub progress: Option<Progress>,
+    pub(crate) progress: Option<Progress>,
     /// Results of this run alone.
-    pub findings: Findings,
+    pub(crate) findings: Findings,
     /// Images for its robots on the page.
-    pub images: Vec<LabelledStimulus>,
+    pub(crate) images: Vec<LabelledStimulus>,
 }
 
 /// Results of tests; `None` for those not done.
 #[derive(Clone, Debug, Default)]
-pub struct Findings {
+pub(crate) struct Findings {
     /// From `eval`.
-    pub eval: Option<EvalFile>,
+    pub(crate) eval: Option<EvalFile>,
     /// From `audit`.
-    pub audit: Option<AuditFile>,
+    pub(crate) audit: Option<AuditFile>,
     /// From `capacity`.
-    pub capacity: Option<CapacityFile>,
+    pub(crate) capacity: Option<CapacityFile>,
 }
 
 impl Findings {
@@ -90,28 +90,28 @@ impl Findings {
 
 /// A team of robots of the runs, and images to watch it with.
 #[derive(Clone, Debug)]
-pub struct Team {
+pub(crate) struct Team {
     /// Results of `team`.
-    pub file: TeamFile,
+    pub(crate) file: TeamFile,
     /// The run of each of its robots.
-    pub runs: Vec<usize>,
+    pub(crate) runs: Vec<usize>,
     /// Images to watch it with, the first of each class: positions among the file's images.
-    pub images: Vec<usize>,
+    pub(crate) images: Vec<usize>,
     /// These images as the robots of each run see them.
-    pub seen: Vec<Vec<LabelledStimulus>>,
+    pub(crate) seen: Vec<Vec<LabelledStimulus>>,
     /// These images as all robots see them together.
-    pub together: Vec<LabelledStimulus>,
+    pub(crate) together: Vec<LabelledStimulus>,
 }
 
 /// All data of a page.
 #[derive(Clone, Debug)]
-pub struct Gathered {
+pub(crate) struct Gathered {
     /// The runs.
-    pub runs: Vec<Dossier>,
+    pub(crate) runs: Vec<Dossier>,
     /// Results of several runs together, from above their folders.
-    pub together: Findings,
+    pub(crate) together: Findings,
     /// Results of `team` for robots of these runs, from there too.
-    pub team: Option<Team>,
+    pub(crate) team: Option<Team>,
 }
 
 /// Reads runs and the results beside them; unreadable results go to `warn`. Without
@@ -119,7 +119,7 @@ pub struct Gathered {
 ///
 /// # Errors
 /// Returns an error if a run or its images are wrong.
-pub fn gather(
+pub(crate) fn gather(
     archives: &[PathBuf],
     data: Option<&Path>,
     with_rollouts: bool,
@@ -212,7 +212,7 @@ impl Team {
     }
 
     /// Records the rollout of a member under one of the images to watch it with.
-    pub fn record(&self, runs: &[Dossier], member: usize, image: usize) -> Recording {
+    pub(crate) fn record(&self, runs: &[Dossier], member: usize, image: usize) -> Recording {
         let run = self.runs[member];
         let config = &runs[run].run.config;
         let control_steps = control_steps(config, self.file.cycles);
@@ -268,7 +268,7 @@ pub(crate) fn check_length(config: &Config, images: usize) -> Result<(), Error> 
 
 impl Dossier {
     /// Records the rollout of a robot under the images.
-    pub fn record(&self, robot: &Robot) -> Recording {
+    pub(crate) fn record(&self, robot: &Robot) -> Recording {
         let config = &self.run.config;
         let fresh = config.protocol.rollout == RolloutMode::Fresh;
         let recording =
@@ -277,14 +277,14 @@ impl Dossier {
     }
 
     /// Returns the seconds of the run and its number of offspring; `None` without a metrics.csv.
-    pub fn effort(&self) -> Option<(f64, f64)> {
+    pub(crate) fn effort(&self) -> Option<(f64, f64)> {
         let last = self.progress.as_ref()?.moments.last()?;
         Some((last.seconds, last.evaluations))
     }
 
     /// Returns the robots that differ most: the fittest, then in turn the one whose body is
     /// farthest from all before (in voxels that differ), among those fitter than 0.
-    pub fn most_different(&self, count: usize) -> Vec<&Robot> {
+    pub(crate) fn most_different(&self, count: usize) -> Vec<&Robot> {
         let able = || self.run.elites.iter().filter(|robot| robot.objective > 0.0);
         let mut chosen: Vec<&Robot> =
             self.run.best().filter(|best| best.objective > 0.0).into_iter().collect();

@@ -1,9 +1,9 @@
 //! Analysis of robots: audit verdicts, team votes, simple classifiers, and the paper's numbers.
 
-pub mod baselines;
-pub mod dossier;
-pub mod progress;
-pub mod published;
-pub mod sweep;
-pub mod verdict;
-pub mod votes;
+pub(crate) mod baselines;
+pub(crate) mod dossier;
+pub(crate) mod progress;
+pub(crate) mod published;
+pub(crate) mod sweep;
+pub(crate) mod verdict;
+pub(crate) mod votes;

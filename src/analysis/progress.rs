@@ -10,32 +10,32 @@ use std::path::Path;
 
 /// How a run came along.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Progress {
+pub(crate) struct Progress {
     /// Name of the run.
-    pub run: String,
+    pub(crate) run: String,
     /// Its seed.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// What its fitness is measured in.
-    pub unit: Option<&'static str>,
+    pub(crate) unit: Option<&'static str>,
     /// A moment per generation, at least one.
-    pub moments: Vec<Moment>,
+    pub(crate) moments: Vec<Moment>,
     /// All that its results depend on but the seed.
-    pub settings: Settings,
+    pub(crate) settings: Settings,
 }
 
 /// Runs that differ in nothing but the seed, and so belong together.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SettingsGroup<'a> {
+pub(crate) struct SettingsGroup<'a> {
     /// What tells it from the others, as "parents=10, 0|1".
-    pub label: String,
+    pub(crate) label: String,
     /// Its value of each key in which groups differ; none where it has no such key.
-    pub values: Vec<Option<String>>,
+    pub(crate) values: Vec<Option<String>>,
     /// Its runs.
-    pub runs: Vec<&'a Progress>,
+    pub(crate) runs: Vec<&'a Progress>,
 }
 
 /// Runs in groups, in the order of their first ones, and the keys in which these differ.
-pub fn alike(runs: &[Progress]) -> (Vec<String>, Vec<SettingsGroup<'_>>) {
+pub(crate) fn alike(runs: &[Progress]) -> (Vec<String>, Vec<SettingsGroup<'_>>) {
     let mut groups: Vec<Vec<&Progress>> = Vec::new();
     for run in runs {
         match groups.iter_mut().find(|group| group[0].settings == run.settings) {
@@ -80,7 +80,7 @@ impl Progress {
     ///
     /// # Errors
     /// What is missing or wrong, with its line.
-    pub fn of(run: &RunFile, archive: &Path) -> Result<Self, Error> {
+    pub(crate) fn of(run: &RunFile, archive: &Path) -> Result<Self, Error> {
         let moments = moments_of(run, archive)?;
         let unit = run.fitness().unit();
         let mut settings = run.config.settings();

@@ -2,19 +2,19 @@
 
 /// A row of the paper's table.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PaperRow {
+pub(crate) struct PaperRow {
     /// The task.
-    pub task: &'static str,
+    pub(crate) task: &'static str,
     /// Mean accuracy of ten robots on held-out images \[%\] (section "Generalization test").
-    pub accuracy: f64,
+    pub(crate) accuracy: f64,
     /// Hidden neurons of the equivalent network, if any ("Morphological cognition capacity").
-    pub mlp: Option<f64>,
+    pub(crate) mlp: Option<f64>,
     /// Kernels of the equivalent convolutional network.
-    pub cnn: Option<f64>,
+    pub(crate) cnn: Option<f64>,
 }
 
 /// The paper's table, on MNIST.
-pub const PAPER: [PaperRow; 8] = [
+pub(crate) const PAPER: [PaperRow; 8] = [
     PaperRow { task: "0|1", accuracy: 76.57, mlp: Some(16.8), cnn: Some(5.9) },
     PaperRow { task: "0|123", accuracy: 68.47, mlp: None, cnn: None },
     PaperRow { task: "1|023", accuracy: 58.96, mlp: None, cnn: Some(16.2) },
@@ -26,6 +26,6 @@ pub const PAPER: [PaperRow; 8] = [
 ];
 
 /// Returns the paper's row of a task; there are rows for MNIST only.
-pub fn row(dataset: &str, task: &str) -> Option<&'static PaperRow> {
+pub(crate) fn row(dataset: &str, task: &str) -> Option<&'static PaperRow> {
     PAPER.iter().find(|row| dataset == "mnist" && row.task == task)
 }

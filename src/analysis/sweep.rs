@@ -9,71 +9,71 @@ use std::path::PathBuf;
 
 /// What a task found on one of the tasks that its robots do, as 0|1.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SweepRow {
+pub(crate) struct SweepRow {
     /// The task's number in the sweep, from 1.
-    pub number: usize,
+    pub(crate) number: usize,
     /// Its name.
-    pub name: String,
+    pub(crate) name: String,
     /// How far it is.
-    pub state: TaskState,
+    pub(crate) state: TaskState,
     /// Varied keys with its values.
-    pub varied: Vec<(String, String)>,
+    pub(crate) varied: Vec<(String, String)>,
     /// Its run, as far as there is one.
-    pub run: Option<RunRow>,
+    pub(crate) run: Option<RunRow>,
 }
 
 /// What a run found on one task.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RunRow {
+pub(crate) struct RunRow {
     /// What is told apart, as "0|1".
-    pub recognises: String,
+    pub(crate) recognises: String,
     /// Generations done.
-    pub generations: u64,
+    pub(crate) generations: u64,
     /// Wall-clock time of the run \[s\].
-    pub seconds: f64,
+    pub(crate) seconds: f64,
     /// Elites of this task.
-    pub num_elites: usize,
+    pub(crate) num_elites: usize,
     /// Largest objective of them.
-    pub obj_max: Option<f64>,
+    pub(crate) obj_max: Option<f64>,
     /// Balanced accuracy of the first robot on validation images, from 0 to 1.
-    pub validation: Option<f64>,
+    pub(crate) validation: Option<f64>,
     /// Robots audited, and how many of them are physical.
-    pub audited: Option<[usize; 2]>,
+    pub(crate) audited: Option<[usize; 2]>,
     /// How robots did on held-out images.
-    pub tested: Option<Tested>,
+    pub(crate) tested: Option<Tested>,
 }
 
 /// A test.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tested {
+pub(crate) struct Tested {
     /// Which images.
-    pub split: HeldOut,
+    pub(crate) split: HeldOut,
     /// How many.
-    pub images: usize,
+    pub(crate) images: usize,
     /// Robots.
-    pub robots: usize,
+    pub(crate) robots: usize,
     /// Their mean accuracy, from 0 to 1.
-    pub accuracy: f64,
+    pub(crate) accuracy: f64,
     /// Its 95 % interval: of one robot over images, of several over robots.
-    pub interval: Option<[f64; 2]>,
+    pub(crate) interval: Option<[f64; 2]>,
     /// Their mean balanced accuracy.
-    pub balanced: f64,
+    pub(crate) balanced: f64,
 }
 
 /// Everything that is collected.
 #[derive(Clone, Debug)]
-pub struct Collected {
+pub(crate) struct Collected {
     /// A row per task and what its robots tell apart.
-    pub rows: Vec<SweepRow>,
+    pub(crate) rows: Vec<SweepRow>,
     /// How the runs that evolved came along.
-    pub progress: Vec<Progress>,
+    pub(crate) progress: Vec<Progress>,
     /// The run.json files, for commands that take several.
-    pub archives: Vec<PathBuf>,
+    pub(crate) archives: Vec<PathBuf>,
 }
 
 /// What a row says of its run, as the columns of `sweep.csv`; nothing where there is none.
 #[derive(Debug, Default, Serialize)]
-pub struct Columns<'a> {
+pub(crate) struct Columns<'a> {
     recognises: Option<&'a str>,
     generations: Option<u64>,
     seconds: Option<f64>,
@@ -112,7 +112,7 @@ impl<'a> Columns<'a> {
     ];
 
     /// Of a row.
-    pub fn of(row: &'a SweepRow) -> Self {
+    pub(crate) fn of(row: &'a SweepRow) -> Self {
         let Some(run) = &row.run else { return Columns::default() };
         let tested = run.tested.as_ref();
         let interval = tested.and_then(|tested| tested.interval);
@@ -137,7 +137,7 @@ impl<'a> Columns<'a> {
 }
 
 /// The table as CSV: a row per task and what its robots tell apart; a column per varied key.
-pub fn csv(rows: &[SweepRow]) -> Vec<u8> {
+pub(crate) fn csv(rows: &[SweepRow]) -> Vec<u8> {
     let mut keys: Vec<&String> = rows.iter().flat_map(|row| row.varied.iter().map(|(key, _)| key)).collect();
     keys.sort_unstable();
     keys.dedup();

@@ -28,7 +28,7 @@ pub(crate) struct Behaviour<'a> {
 
 impl<'a> Behaviour<'a> {
     /// Evaluates a robot's unperturbed displacements on its task, under images of these classes.
-    pub fn new(
+    pub(crate) fn new(
         criteria: &'a Criteria,
         (split, fitness): (&ClassSplit, Fitness),
         classes: &[u8],
@@ -74,12 +74,12 @@ impl<'a> Behaviour<'a> {
     }
 
     /// Returns true if the robot can be audited.
-    pub fn is_walker(&self) -> bool {
+    pub(crate) fn is_walker(&self) -> bool {
         self.flaw.is_none()
     }
 
     /// Compares a perturbed rollout with the unperturbed one.
-    pub fn compare(
+    pub(crate) fn compare(
         &self,
         name: String,
         kind: PerturbationKind,
@@ -99,7 +99,7 @@ impl<'a> Behaviour<'a> {
     }
 
     /// Returns the verdict and its reason.
-    pub fn judge(&self, rollouts: &[PerturbedRollout]) -> (Verdict, String) {
+    pub(crate) fn judge(&self, rollouts: &[PerturbedRollout]) -> (Verdict, String) {
         if let Some(flaw) = &self.flaw {
             return (Verdict::NotAWalker, flaw.clone());
         }
@@ -127,7 +127,7 @@ impl<'a> Behaviour<'a> {
 
     /// Returns the root mean square difference of displacements between perturbed and unperturbed
     /// rollouts \[voxel lengths\]; unstable rollouts are left out.
-    pub fn spread(&self, rollouts: &[PerturbedRollout]) -> f64 {
+    pub(crate) fn spread(&self, rollouts: &[PerturbedRollout]) -> f64 {
         let stable = rollouts.iter().filter_map(|rollout| rollout.displacements.as_ref());
         let squares: Vec<f64> =
             stable.flat_map(|d| d.iter().zip(&self.plain).map(|(a, b)| (a - b) * (a - b))).collect();

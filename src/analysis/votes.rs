@@ -9,23 +9,23 @@ use crate::task::fitness::Group;
 use serde::Serialize;
 
 /// Largest displacement that counts in a sum of walks \[voxel lengths\].
-pub const CLIP: f64 = 10.0;
+pub(crate) const CLIP: f64 = 10.0;
 
 /// The votes and sums of walks under one image, for every class.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Ballot {
+pub(crate) struct Ballot {
     /// Votes: each robot has one for every class of the side it walked to.
-    pub votes: Vec<usize>,
+    pub(crate) votes: Vec<usize>,
     /// Sums of walks \[voxel lengths\]: positive towards a class's side, negative away from it.
-    pub sums: Vec<f64>,
+    pub(crate) sums: Vec<f64>,
     /// Number of robots that gave no vote.
-    pub silent: usize,
+    pub(crate) silent: usize,
 }
 
 impl Ballot {
     /// Counts one walk of each robot; `None` is an unstable one, without effect. A walk of at most
     /// `threshold` gives no vote; one longer than `clip` counts as `clip`.
-    pub fn count<'a>(
+    pub(crate) fn count<'a>(
         classes: &[u8],
         walks: impl IntoIterator<Item = (&'a Readout, Option<f64>)>,
         threshold: f64,
@@ -53,14 +53,14 @@ impl Ballot {
 
     /// Returns the index of the class with most votes, and true if several tie. Among those the
     /// largest sum of walks wins, then the first.
-    pub fn by_votes(&self) -> (usize, bool) {
+    pub(crate) fn by_votes(&self) -> (usize, bool) {
         let most = self.votes.iter().copied().max().unwrap_or(0);
         let among = || (0..self.votes.len()).filter(|place| self.votes[*place] == most);
         (self.largest(among()), among().count() > 1)
     }
 
     /// Returns the index of the class with the largest sum of walks; the first wins a tie.
-    pub fn by_walks(&self) -> usize {
+    pub(crate) fn by_walks(&self) -> usize {
         self.largest(0..self.sums.len())
     }
 
@@ -77,19 +77,19 @@ impl Ballot {
 
 /// The walks of a team under one image and their counts, at the end or before.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Tally {
+pub(crate) struct Tally {
     /// Displacement of each robot so far \[voxel lengths\]; `None` if it became unstable.
-    pub moved: Vec<Option<f64>>,
+    pub(crate) moved: Vec<Option<f64>>,
     /// Votes and sums of walks, for every class.
     #[serde(flatten)]
-    pub ballot: Ballot,
+    pub(crate) ballot: Ballot,
     /// The class with most votes; `None` while there is no vote.
-    pub says: Option<u8>,
+    pub(crate) says: Option<u8>,
 }
 
 impl Tally {
     /// Counts walks; threshold and clip are those of [`Ballot::count`].
-    pub fn of(
+    pub(crate) fn of(
         classes: &[u8],
         judges: &[&Readout],
         moved: Vec<Option<f64>>,
@@ -105,7 +105,7 @@ impl Tally {
 
 impl Accuracy {
     /// Computes the accuracy from pairs of an answer and the correct one.
-    pub fn of<T: PartialEq>(answers: impl IntoIterator<Item = (T, T)>) -> Self {
+    pub(crate) fn of<T: PartialEq>(answers: impl IntoIterator<Item = (T, T)>) -> Self {
         let (mut right, mut all) = (0, 0);
         for (answer, expected) in answers {
             right += usize::from(answer == expected);

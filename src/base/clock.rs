@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 /// The clock of [`thread_time`]: "processor", or "wall" if the system does not report that.
-pub const CLOCK: &str = if IS_KNOWN { "processor" } else { "wall" };
+pub(crate) const CLOCK: &str = if IS_KNOWN { "processor" } else { "wall" };
 
 #[cfg(all(
     unix,
@@ -20,9 +20,9 @@ mod system {
     use super::Duration;
     use rustix::time::{ClockId, clock_gettime};
 
-    pub const IS_KNOWN: bool = true;
+    pub(crate) const IS_KNOWN: bool = true;
 
-    pub fn now() -> Duration {
+    pub(crate) fn now() -> Duration {
         Duration::try_from(clock_gettime(ClockId::ThreadCPUTime))
             .expect("no thread has run for less than nothing")
     }
@@ -44,11 +44,11 @@ mod system {
     use std::sync::LazyLock;
     use std::time::Instant;
 
-    pub const IS_KNOWN: bool = false;
+    pub(crate) const IS_KNOWN: bool = false;
 
     static BEGIN: LazyLock<Instant> = LazyLock::new(Instant::now);
 
-    pub fn now() -> Duration {
+    pub(crate) fn now() -> Duration {
         BEGIN.elapsed()
     }
 }

@@ -29,7 +29,7 @@ pub enum ErrorKind {
 
 impl ErrorKind {
     /// Returns the process's exit code.
-    pub fn exit_code(self) -> u8 {
+    pub(crate) fn exit_code(self) -> u8 {
         match self {
             ErrorKind::Other => 1,
             ErrorKind::Usage => 2,
@@ -56,7 +56,7 @@ pub struct Error {
     /// Alternatives for the user, the most likely one first.
     pub remedies: Vec<Remedy>,
     /// The config key that it is about, if any: a dotted path, items of lists by number from 1.
-    pub key: Option<String>,
+    pub(crate) key: Option<String>,
 }
 
 /// A field of a command's options.
@@ -79,33 +79,33 @@ impl Error {
     }
 
     /// Reports that a key of a config has an invalid value.
-    pub fn value(key: &str, found: impl fmt::Display, expected: &str) -> Self {
+    pub(crate) fn value(key: &str, found: impl fmt::Display, expected: &str) -> Self {
         Error::input(format!("{key} = {found}: expected {expected}")).with_key(key)
     }
 
     /// Reports a problem with a key of a config.
-    pub fn at_key(key: &str, text: impl fmt::Display) -> Self {
+    pub(crate) fn at_key(key: &str, text: impl fmt::Display) -> Self {
         Error::input(format!("{key}: {text}")).with_key(key)
     }
 
     /// Reports that an argument of a command has an invalid value; `text` says what was expected.
-    pub fn argument(name: &'static str, value: impl fmt::Display, text: impl Into<String>) -> Self {
+    pub(crate) fn argument(name: &'static str, value: impl fmt::Display, text: impl Into<String>) -> Self {
         let value = Some(one_line(&value.to_string()));
         Error { argument: Some(Argument { name, value }), ..Error::usage(text.into()) }
     }
 
     /// Reports that the command line is wrong.
-    pub fn usage(message: String) -> Self {
+    pub(crate) fn usage(message: String) -> Self {
         Error::new(ErrorKind::Usage, message)
     }
 
     /// Reports that something is in the way.
-    pub fn occupied(message: String) -> Self {
+    pub(crate) fn occupied(message: String) -> Self {
         Error::new(ErrorKind::Occupied, message)
     }
 
     /// Reports a failure of another kind.
-    pub fn other(message: String) -> Self {
+    pub(crate) fn other(message: String) -> Self {
         Error::new(ErrorKind::Other, message)
     }
 
@@ -115,17 +115,17 @@ impl Error {
     }
 
     /// Reports that a signal stopped the command.
-    pub fn stopped(message: String) -> Self {
+    pub(crate) fn stopped(message: String) -> Self {
         Error::new(ErrorKind::Stopped, message)
     }
 
     /// Reports that a file from the user cannot be read.
-    pub fn reading(path: &Path, error: &io::Error) -> Self {
+    pub(crate) fn reading(path: &Path, error: &io::Error) -> Self {
         Error::input(format!("{}: cannot be read: {error}", path.display()))
     }
 
     /// Acts as [`Error::reading`], and adds a remedy if there is no such file.
-    pub fn reading_or(path: &Path, error: &io::Error, remedy: Remedy) -> Self {
+    pub(crate) fn reading_or(path: &Path, error: &io::Error, remedy: Remedy) -> Self {
         let text = Error::reading(path, error);
         if error.kind() == io::ErrorKind::NotFound { text.remedy(remedy) } else { text }
     }
@@ -142,7 +142,7 @@ impl Error {
 
     /// Reports that a file cannot be written; adds remedies if there is no room for it or the lock
     /// of its folder is lost.
-    pub fn writing(path: &Path, error: &io::Error) -> Self {
+    pub(crate) fn writing(path: &Path, error: &io::Error) -> Self {
         // A folder removed a moment ago fails in other ways, too.
         let now = ownership::check(path).err();
         if let Some(lost) = [Some(error), now.as_ref()].into_iter().flatten().find_map(Lost::of) {
@@ -166,7 +166,7 @@ impl Error {
 
     /// Adds a remedy after the existing ones.
     #[must_use]
-    pub fn remedy(mut self, remedy: Remedy) -> Self {
+    pub(crate) fn remedy(mut self, remedy: Remedy) -> Self {
         self.remedies.push(match remedy {
             Remedy::Advice(text) => Remedy::Advice(one_line(&text)),
             remedy => remedy,
@@ -176,19 +176,19 @@ impl Error {
 
     /// Adds advice in plain words, without names of options or commands.
     #[must_use]
-    pub fn advice(self, text: impl Into<String>) -> Self {
+    pub(crate) fn advice(self, text: impl Into<String>) -> Self {
         self.remedy(Remedy::advice(text))
     }
 
     /// Names the argument that the error is about.
     #[must_use]
-    pub fn about(self, name: &'static str) -> Self {
+    pub(crate) fn about(self, name: &'static str) -> Self {
         Error { argument: Some(Argument { name, value: None }), ..self }
     }
 
     /// Names the key that the error is about.
     #[must_use]
-    pub fn with_key(self, key: &str) -> Self {
+    pub(crate) fn with_key(self, key: &str) -> Self {
         Error { key: Some(key.to_string()), ..self }
     }
 
@@ -206,7 +206,7 @@ impl Error {
 
 /// Returns true if there is no room: on the disk, in the user's quota or within the file size
 /// limit.
-pub fn is_full(error: &io::Error) -> bool {
+pub(crate) fn is_full(error: &io::Error) -> bool {
     use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
     matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)
 }

@@ -21,7 +21,7 @@ const MOST_TEXT: u64 = 256 << 20;
 ///
 /// # Errors
 /// Returns the system's error, or one that names the kind if it is no regular file.
-pub fn open_file(path: &Path) -> io::Result<File> {
+pub(crate) fn open_file(path: &Path) -> io::Result<File> {
     let mut options = File::options();
     options.read(true);
     #[cfg(unix)]
@@ -53,7 +53,7 @@ fn regular(found: &Metadata) -> io::Result<()> {
 ///
 /// # Errors
 /// Returns an error if something else is in its place.
-pub fn check_file(path: &Path) -> io::Result<()> {
+pub(crate) fn check_file(path: &Path) -> io::Result<()> {
     std::fs::metadata(path).map_or(Ok(()), |found| regular(&found))
 }
 
@@ -61,7 +61,7 @@ pub fn check_file(path: &Path) -> io::Result<()> {
 ///
 /// # Errors
 /// As [`open_file`].
-pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
+pub(crate) fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open_file(path)?.read_to_end(&mut bytes)?;
     Ok(bytes)
@@ -71,7 +71,7 @@ pub fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
 ///
 /// # Errors
 /// As [`open_file`] and [`read_limited`].
-pub fn read_text(path: &Path) -> io::Result<String> {
+pub(crate) fn read_text(path: &Path) -> io::Result<String> {
     read_limited(open_file(path)?)
 }
 
@@ -80,7 +80,7 @@ pub fn read_text(path: &Path) -> io::Result<String> {
 ///
 /// # Errors
 /// As [`read_text`].
-pub fn read_given(path: &Path) -> io::Result<String> {
+pub(crate) fn read_given(path: &Path) -> io::Result<String> {
     match std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
         true => read_limited(File::open(path)?),
         false => read_text(path),
@@ -91,7 +91,7 @@ pub fn read_given(path: &Path) -> io::Result<String> {
 ///
 /// # Errors
 /// Returns the system's error, or its own if it is no such text or exceeds 256 megabytes.
-pub fn read_limited(source: impl Read) -> io::Result<String> {
+pub(crate) fn read_limited(source: impl Read) -> io::Result<String> {
     let mut bytes = Vec::new();
     let read = source.take(MOST_TEXT + 1).read_to_end(&mut bytes)?;
     if read as u64 > MOST_TEXT {
@@ -112,7 +112,7 @@ fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Option<String> {
 }
 
 /// Replaces a leading `~` by the user's home folder; in files and `--option=~/…` no shell does.
-pub fn home_expanded(path: &Path) -> PathBuf {
+pub(crate) fn home_expanded(path: &Path) -> PathBuf {
     match (path.strip_prefix("~"), std::env::home_dir()) {
         (Ok(below), Some(home)) if !home.as_os_str().is_empty() => home.join(below),
         _ => path.to_path_buf(),
@@ -126,7 +126,7 @@ pub fn home_expanded(path: &Path) -> PathBuf {
 /// # Errors
 /// Returns the system's error, for example if the folder does not exist, or [`ownership::Lost`].
 /// The file then stays as it was.
-pub fn write_atomically(path: &Path, content: &[u8]) -> io::Result<()> {
+pub(crate) fn write_atomically(path: &Path, content: &[u8]) -> io::Result<()> {
     write_whole(path, |file| file.write_all(content))
 }
 
@@ -134,7 +134,7 @@ pub fn write_atomically(path: &Path, content: &[u8]) -> io::Result<()> {
 ///
 /// # Errors
 /// As [`write_atomically`]; also the error of `write`.
-pub fn write_whole(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
+pub(crate) fn write_whole(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
     // A rename would replace a device or a link by an ordinary file.
     if std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
         return write(&mut File::options().write(true).open(path)?);
@@ -209,7 +209,7 @@ fn led_to(path: &Path) -> PathBuf {
 ///
 /// # Errors
 /// Returns the system's error, for example if the folder does not exist.
-pub fn check_writable(path: &Path) -> io::Result<()> {
+pub(crate) fn check_writable(path: &Path) -> io::Result<()> {
     match std::fs::metadata(path) {
         Ok(found) if found.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
         Ok(found) if !found.is_file() => Ok(()),
@@ -222,7 +222,7 @@ pub fn check_writable(path: &Path) -> io::Result<()> {
 ///
 /// # Errors
 /// Returns the system's error.
-pub fn remove_half_written(folder: &Path, names: &[&str]) -> io::Result<()> {
+pub(crate) fn remove_half_written(folder: &Path, names: &[&str]) -> io::Result<()> {
     for entry in std::fs::read_dir(folder)? {
         let entry = entry?;
         if temporary_of(&entry.file_name().to_string_lossy()).is_some_and(|name| names.contains(&name)) {
@@ -236,7 +236,7 @@ pub fn remove_half_written(folder: &Path, names: &[&str]) -> io::Result<()> {
 ///
 /// # Errors
 /// Returns the system's error.
-pub fn sync_folder(folder: &Path) -> io::Result<()> {
+pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
     if cfg!(unix) { File::open(folder)?.sync_all() } else { Ok(()) }
 }
 

@@ -9,14 +9,14 @@ pub fn sha256_hex(bytes: &[u8]) -> String {
 
 /// Returns the first 16 bytes of SHA-256: enough that two different contents never collide in
 /// practice (among 10⁶ contents the chance is below 10⁻²⁶).
-pub fn content_key(bytes: &[u8]) -> [u8; 16] {
+pub(crate) fn content_key(bytes: &[u8]) -> [u8; 16] {
     let mut key = [0; 16];
     key.copy_from_slice(&Sha256::digest(bytes)[..16]);
     key
 }
 
 /// Writes bytes as lower-case hexadecimal.
-pub fn hex(bytes: &[u8]) -> String {
+pub(crate) fn hex(bytes: &[u8]) -> String {
     use std::fmt::Write;
     bytes.iter().fold(String::new(), |mut text, b| {
         let _ = write!(text, "{b:02x}");
@@ -25,7 +25,7 @@ pub fn hex(bytes: &[u8]) -> String {
 }
 
 /// Returns the beginning of a hash, enough for people to compare, or all of a shorter one.
-pub fn short(hash: &str) -> &str {
+pub(crate) fn short(hash: &str) -> &str {
     hash.get(..10).unwrap_or(hash)
 }
 

@@ -2,20 +2,20 @@
 
 pub mod clock;
 pub mod error;
-pub mod files;
+pub(crate) mod files;
 pub mod hash;
-pub mod number;
+pub(crate) mod number;
 pub mod observer;
-pub mod ownership;
+pub(crate) mod ownership;
 pub mod random;
 pub(crate) mod ranges;
 pub mod ranks;
 pub mod remedy;
 pub mod session;
-pub mod shell;
-pub mod signals;
-pub mod statistics;
-pub mod table;
+pub(crate) mod shell;
+pub(crate) mod signals;
+pub(crate) mod statistics;
+pub(crate) mod table;
 pub mod text;
 pub mod threads;
 

@@ -6,23 +6,23 @@ pub(crate) fn is_zero(number: &usize) -> bool {
 }
 
 /// Formats a number with fixed decimals. A value that rounds to 0 has no sign: no −0.00.
-pub fn fixed(value: f64, decimals: usize) -> String {
+pub(crate) fn fixed(value: f64, decimals: usize) -> String {
     unsigned_zero(format!("{value:.decimals$}"))
 }
 
 /// Formats a number as [`fixed`], with a plus if it is positive.
-pub fn signed(value: f64, decimals: usize) -> String {
+pub(crate) fn signed(value: f64, decimals: usize) -> String {
     unsigned_zero(format!("{value:+.decimals$}"))
 }
 
 /// Formats a fraction as a percentage with one decimal.
-pub fn percent(share: f64) -> String {
+pub(crate) fn percent(share: f64) -> String {
     fixed(100.0 * share, 1)
 }
 
 /// Formats the share of a variance that a model with this R² explains, in percent without decimals.
 /// A model with a negative cross-validated R² predicts worse than the mean, and explains nothing.
-pub fn explained(r_squared: f64) -> String {
+pub(crate) fn explained(r_squared: f64) -> String {
     fixed(100.0 * r_squared.max(0.0), 0)
 }
 

@@ -41,7 +41,7 @@ pub struct Work {
 
 impl Work {
     /// Makes work of which nothing was done before.
-    pub fn new(label: String, total: u64, unit: &'static str) -> Self {
+    pub(crate) fn new(label: String, total: u64, unit: &'static str) -> Self {
         Work { label, total, known: 0, unit }
     }
 }
@@ -54,11 +54,11 @@ pub struct Generation {
     pub done: u64,
     /// Generations in all.
     #[serde(rename = "generations")]
-    pub total: u64,
+    pub(crate) total: u64,
     /// Best fitness so far, in the fitness's unit; none if no robot has one.
-    pub best: Option<f64>,
+    pub(crate) best: Option<f64>,
     /// Fraction of the possible cells that are filled, from 0 to 1.
-    pub coverage: f64,
+    pub(crate) coverage: f64,
     /// Evaluations so far.
-    pub evaluations: u64,
+    pub(crate) evaluations: u64,
 }

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A lock on a folder that this process no longer holds.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Lost {
+pub(crate) enum Lost {
     /// Another process holds it.
     #[error("{holder} has taken over {}", lock.display())]
     Taken {
@@ -33,7 +33,7 @@ impl From<Lost> for io::Error {
 
 impl Lost {
     /// Returns the loss that caused an error of a write, if one did.
-    pub fn of(error: &io::Error) -> Option<&Self> {
+    pub(crate) fn of(error: &io::Error) -> Option<&Self> {
         error.get_ref()?.downcast_ref()
     }
 }
@@ -55,12 +55,12 @@ fn claims() -> MutexGuard<'static, Vec<Claim>> {
 
 /// A claim on a folder, given up on drop.
 #[derive(Debug)]
-pub struct Ownership(u64);
+pub(crate) struct Ownership(u64);
 
 impl Ownership {
     /// Claims the folder of a lock. Before this process writes a file there, it calls `look`, which
     /// fails if it no longer may.
-    pub fn claim(lock: &Path, look: impl Fn() -> io::Result<()> + Send + Sync + 'static) -> Self {
+    pub(crate) fn claim(lock: &Path, look: impl Fn() -> io::Result<()> + Send + Sync + 'static) -> Self {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
         claims().push(Claim { number, places: places(folder_of(lock)), look: Arc::new(look) });
@@ -78,7 +78,7 @@ impl Drop for Ownership {
 ///
 /// # Errors
 /// Returns [`Lost`], or the system's error if the lock cannot be read.
-pub fn check(file: &Path) -> io::Result<()> {
+pub(crate) fn check(file: &Path) -> io::Result<()> {
     if claims().is_empty() {
         return Ok(());
     }

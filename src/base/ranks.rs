@@ -27,7 +27,7 @@ const LAUNCHED: [&str; 2] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"];
 
 impl Ranks {
     /// A process by itself.
-    pub const ALONE: Ranks = Ranks { rank: 0, size: 1 };
+    pub(crate) const ALONE: Ranks = Ranks { rank: 0, size: 1 };
 
     /// Joins the ranks that this process was started with; without MPI it is alone.
     ///
@@ -46,7 +46,7 @@ impl Ranks {
     }
 
     /// Returns the number of this rank, from 0.
-    pub fn rank(self) -> usize {
+    pub(crate) fn rank(self) -> usize {
         self.rank
     }
 
@@ -56,7 +56,7 @@ impl Ranks {
     }
 
     /// Returns the rank that does each piece of work, given the pieces' sizes.
-    pub fn owners(self, sizes: &[u64]) -> Vec<usize> {
+    pub(crate) fn owners(self, sizes: &[u64]) -> Vec<usize> {
         owners(sizes, self.size)
     }
 
@@ -76,7 +76,7 @@ impl Ranks {
     /// Divides jobs among the ranks by size. Each rank does its own with `work` and receives all
     /// results, in the jobs' order. If one rank's `work` gives up, all return `None`. Every rank
     /// must call it with the same jobs, or the others block.
-    pub fn scatter_gather<J, R: Serialize + DeserializeOwned>(
+    pub(crate) fn scatter_gather<J, R: Serialize + DeserializeOwned>(
         self,
         jobs: Vec<J>,
         sizes: &[u64],
@@ -96,17 +96,17 @@ impl Ranks {
     }
 
     /// Returns true if all ranks vote true. Even a stopped rank must vote, or the others block.
-    pub fn all(self, own: bool) -> bool {
+    pub(crate) fn all(self, own: bool) -> bool {
         self.share(own).into_iter().all(|is_so| is_so)
     }
 
     /// Returns the leading rank's value. Every rank must call it, or the others block.
-    pub fn from_lead<T: Serialize + DeserializeOwned>(self, own: Option<T>) -> Option<T> {
+    pub(crate) fn from_lead<T: Serialize + DeserializeOwned>(self, own: Option<T>) -> Option<T> {
         self.share(own).swap_remove(0)
     }
 
     /// Ends all ranks at once, this one with an exit code; for failures that others may not know.
-    pub fn abort(self, code: u8) -> ! {
+    pub(crate) fn abort(self, code: u8) -> ! {
         abort(code)
     }
 }

@@ -56,7 +56,7 @@ pub enum Remedy {
 
 impl Remedy {
     /// Makes advice in plain words.
-    pub fn advice(text: impl Into<String>) -> Self {
+    pub(crate) fn advice(text: impl Into<String>) -> Self {
         Remedy::Advice(text.into())
     }
 }
@@ -65,16 +65,16 @@ impl Remedy {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Invocation {
     /// The command, such as "data fetch".
-    pub command: &'static str,
+    pub(crate) command: &'static str,
     /// Values without an option.
-    pub values: Vec<Value>,
+    pub(crate) values: Vec<Value>,
     /// Options by their names, in order; those without a value are switches.
-    pub options: Vec<(&'static str, Option<Value>)>,
+    pub(crate) options: Vec<(&'static str, Option<Value>)>,
 }
 
 /// The value of an option.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Value {
+pub(crate) enum Value {
     /// A word of any characters.
     Word(String),
     /// A path.
@@ -85,27 +85,27 @@ pub enum Value {
 
 impl Invocation {
     /// Makes a command without options.
-    pub fn new(command: &'static str) -> Self {
+    pub(crate) fn new(command: &'static str) -> Self {
         Invocation { command, values: Vec::new(), options: Vec::new() }
     }
 
     /// Adds a value without an option.
     #[must_use]
-    pub fn value(mut self, value: impl Into<Value>) -> Self {
+    pub(crate) fn value(mut self, value: impl Into<Value>) -> Self {
         self.values.push(value.into());
         self
     }
 
     /// Adds an option with its value.
     #[must_use]
-    pub fn option(mut self, name: &'static str, value: impl Into<Value>) -> Self {
+    pub(crate) fn option(mut self, name: &'static str, value: impl Into<Value>) -> Self {
         self.options.push((name, Some(value.into())));
         self
     }
 
     /// Adds a switch, if `is_on`.
     #[must_use]
-    pub fn switch(mut self, name: &'static str, is_on: bool) -> Self {
+    pub(crate) fn switch(mut self, name: &'static str, is_on: bool) -> Self {
         if is_on {
             self.options.push((name, None));
         }

@@ -12,15 +12,15 @@ use std::sync::atomic::AtomicBool;
 /// The threads and processes of a command, its stop flag, its observer, and the images' folder.
 pub struct Session<'a> {
     /// Number of threads; `None`: one per core. Results do not depend on it.
-    pub threads: Option<usize>,
+    pub(crate) threads: Option<usize>,
     /// Processes that share the work, each with the same options.
-    pub ranks: Ranks,
+    pub(crate) ranks: Ranks,
     /// Stops the command when set, by another thread or a signal; finished work is kept.
-    pub stop: &'a AtomicBool,
+    pub(crate) stop: &'a AtomicBool,
     /// Receives progress, warnings and findings; nothing else is ever printed.
-    pub observer: &'a dyn Observer,
+    pub(crate) observer: &'a dyn Observer,
     /// Folder of the images, if the user names one.
-    pub data: Option<PathBuf>,
+    pub(crate) data: Option<PathBuf>,
     pool: OnceLock<rayon::ThreadPool>,
 }
 
@@ -46,7 +46,7 @@ impl<'a> Session<'a> {
 
     /// Returns a session whose work several processes share.
     #[must_use]
-    pub fn ranks(self, ranks: Ranks) -> Self {
+    pub(crate) fn ranks(self, ranks: Ranks) -> Self {
         Session { ranks, ..self }
     }
 
@@ -57,7 +57,7 @@ impl<'a> Session<'a> {
     }
 
     /// Returns a session with another observer.
-    pub fn watched<'b>(&self, observer: &'b dyn Observer) -> Session<'b>
+    pub(crate) fn watched<'b>(&self, observer: &'b dyn Observer) -> Session<'b>
     where
         'a: 'b,
     {
@@ -65,7 +65,7 @@ impl<'a> Session<'a> {
     }
 
     /// Returns the images' folder that the user names.
-    pub fn folder(&self) -> Option<&Path> {
+    pub(crate) fn folder(&self) -> Option<&Path> {
         self.data.as_deref()
     }
 
@@ -73,7 +73,7 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// Returns an error if the system cannot start the threads.
-    pub fn pool(&self) -> Result<&rayon::ThreadPool, Error> {
+    pub(crate) fn pool(&self) -> Result<&rayon::ThreadPool, Error> {
         if let Some(pool) = self.pool.get() {
             return Ok(pool);
         }
@@ -85,7 +85,7 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// Returns [`Stopped`] if it has.
-    pub fn check(&self) -> Result<(), Stopped> {
+    pub(crate) fn check(&self) -> Result<(), Stopped> {
         check(self.stop)
     }
 }

@@ -5,7 +5,7 @@ use std::ffi::OsStr;
 use std::path::Path;
 
 /// Quotes a path for a shell, so that it is never taken for an option.
-pub fn in_shell(path: &Path) -> String {
+pub(crate) fn in_shell(path: &Path) -> String {
     match path.as_os_str().as_encoded_bytes().starts_with(b"-") {
         true => quoted(Path::new(".").join(path)),
         false => quoted(path),
@@ -14,7 +14,7 @@ pub fn in_shell(path: &Path) -> String {
 
 /// Quotes a word for a shell if it is not plain. Escapes bytes that are not UTF-8 and characters
 /// that a terminal would obey or not display (`$'\377'`: Bash, Zsh and POSIX 2024 read it).
-pub fn quoted(word: impl AsRef<OsStr>) -> String {
+pub(crate) fn quoted(word: impl AsRef<OsStr>) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "_-./:@%+,".contains(c);
     match word.as_ref().to_str() {
         Some(text) if !text.is_empty() && text.chars().all(is_plain) => text.to_string(),

@@ -16,7 +16,7 @@ static UNUSED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
 /// A flag that SIGINT, SIGTERM, SIGUSR1 and SIGHUP set while it exists.
 #[derive(Debug)]
-pub struct StopFlag {
+pub(crate) struct StopFlag {
     stop: Arc<AtomicBool>,
     /// The signal that set it last.
     signal: Arc<AtomicUsize>,
@@ -26,7 +26,7 @@ pub struct StopFlag {
 
 impl StopFlag {
     /// Ends the process by the signal that set the flag, as usual; does nothing if none did.
-    pub fn end_process(self) {
+    pub(crate) fn end_process(self) {
         let signal = self.signal.load(Ordering::Relaxed);
         drop(self);
         if let Some(signal) = i32::try_from(signal).ok().filter(|signal| *signal > 0) {
@@ -52,7 +52,7 @@ impl Drop for StopFlag {
 }
 
 /// Makes writing beyond the file size limit an error instead of the end of the process.
-pub fn heed_file_limit() {
+pub(crate) fn heed_file_limit() {
     // If it cannot be handled, it ends the process as usual.
     #[cfg(unix)]
     let _ = flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
@@ -64,7 +64,7 @@ pub fn heed_file_limit() {
 ///
 /// # Errors
 /// Returns an error if the system does not let signals be handled.
-pub fn stop_flag() -> Result<StopFlag, Error> {
+pub(crate) fn stop_flag() -> Result<StopFlag, Error> {
     let failed = |error: std::io::Error| Error::other(format!("signals cannot be handled: {error}"));
     let signals = stopping();
     let unused = match UNUSED.get() {

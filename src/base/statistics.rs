@@ -3,7 +3,7 @@
 use crate::base::random::{Purpose, stream};
 
 /// Returns the 95 % Wilson score interval of a proportion (Wilson 1927).
-pub fn wilson(right: usize, total: usize) -> [f64; 2] {
+pub(crate) fn wilson(right: usize, total: usize) -> [f64; 2] {
     const Z: f64 = 1.959_963_984_540_054;
     if total == 0 {
         return [0.0, 1.0];
@@ -20,7 +20,7 @@ pub fn wilson(right: usize, total: usize) -> [f64; 2] {
 }
 
 /// Returns the standard deviation of a sample; none for fewer than two values.
-pub fn standard_deviation(values: &[f64]) -> Option<f64> {
+pub(crate) fn standard_deviation(values: &[f64]) -> Option<f64> {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     let squares = values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>();
@@ -31,7 +31,7 @@ pub fn standard_deviation(values: &[f64]) -> Option<f64> {
 /// 1979), the same every time. Values of one cluster, such as the robots of one run, are not
 /// independent. With several clusters, clusters are drawn first, then as many values within each
 /// (Davison & Hinkley 1997, section 3.8). None for fewer than two values.
-pub fn bootstrap(clusters: &[Vec<f64>]) -> Option<[f64; 2]> {
+pub(crate) fn bootstrap(clusters: &[Vec<f64>]) -> Option<[f64; 2]> {
     const RESAMPLES: usize = 10_000;
     let clusters: Vec<&Vec<f64>> = clusters.iter().filter(|values| !values.is_empty()).collect();
     if clusters.iter().map(|values| values.len()).sum::<usize>() < 2 {

@@ -7,7 +7,7 @@ use serde::Serialize;
 ///
 /// # Panics
 /// If a row does not have a field for every column.
-pub fn csv<R: Serialize>(
+pub(crate) fn csv<R: Serialize>(
     columns: impl IntoIterator<Item = impl AsRef<[u8]>>,
     rows: impl IntoIterator<Item = R>,
 ) -> Vec<u8> {
@@ -19,12 +19,12 @@ pub fn csv<R: Serialize>(
 }
 
 /// Returns names of columns numbered from 0, such as `displacement_0`.
-pub fn numbered(name: &str, count: usize) -> impl Iterator<Item = String> {
+pub(crate) fn numbered(name: &str, count: usize) -> impl Iterator<Item = String> {
     (0..count).map(move |number| format!("{name}_{number}"))
 }
 
 /// Pads a list with empty fields to the number of columns.
-pub fn padded(values: &[f64], columns: usize) -> Vec<Option<f64>> {
+pub(crate) fn padded(values: &[f64], columns: usize) -> Vec<Option<f64>> {
     (0..columns).map(|column| values.get(column).copied()).collect()
 }
 

@@ -8,12 +8,12 @@ const MOST: usize = 1500;
 /// Writes a text as one line of printable characters. Control characters, line breaks and changes
 /// of writing direction become `\u{…}` (or `\n`, `\r`, `\t`), so that a file or its name can
 /// neither command the terminal nor forge a line. A very long text loses its middle.
-pub fn one_line(text: &str) -> String {
+pub(crate) fn one_line(text: &str) -> String {
     shortened(text, MOST)
 }
 
 /// Acts as [`one_line`], but cuts to about this number of characters.
-pub fn shortened(text: &str, most: usize) -> String {
+pub(crate) fn shortened(text: &str, most: usize) -> String {
     let begin: String = text.chars().take(most + 1).map(written).collect();
     let whole = || text.chars().map(written).collect();
     // It is short enough, even when escaped.
@@ -34,7 +34,7 @@ pub fn shortened(text: &str, most: usize) -> String {
 }
 
 /// Writes a number with the noun for one or for any other number of things: "1 robot", "2 robots".
-pub fn counted<N: Display + PartialEq + From<u8>>(count: N, one: &str, more: &str) -> String {
+pub(crate) fn counted<N: Display + PartialEq + From<u8>>(count: N, one: &str, more: &str) -> String {
     let word = if count == N::from(1) { one } else { more };
     format!("{count} {word}")
 }
@@ -56,7 +56,7 @@ pub fn is_unseen(c: char) -> bool {
 }
 
 /// Formats a time span in its two largest units: "45 s", "12 min 3 s", "3 h 20 min", "2 d 4 h".
-pub fn duration(seconds: f64) -> String {
+pub(crate) fn duration(seconds: f64) -> String {
     let whole = if seconds.is_finite() { seconds.max(0.0).round() as u64 } else { 0 };
     let (minutes, hours, days) = (whole / 60, whole / 3600, whole / 86400);
     match (days, hours, minutes) {

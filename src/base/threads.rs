@@ -12,7 +12,7 @@ pub const MOST_THREADS: u16 = 1024;
 ///
 /// # Errors
 /// Returns an error if it is more than [`MOST_THREADS`].
-pub fn check_environment() -> Result<(), Error> {
+pub(crate) fn check_environment() -> Result<(), Error> {
     const NAME: &str = "RAYON_NUM_THREADS";
     let asked = std::env::var(NAME).ok().and_then(|text| text.parse::<usize>().ok());
     match asked.filter(|threads| *threads > usize::from(MOST_THREADS)) {
@@ -38,7 +38,7 @@ pub fn pool(threads: Option<usize>) -> Result<rayon::ThreadPool, Error> {
 ///
 /// # Errors
 /// Returns an error if the system has no threads left.
-pub fn in_pool<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, Error> {
+pub(crate) fn in_pool<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, Error> {
     if rayon::current_thread_index().is_some() {
         return Ok(work());
     }
@@ -66,7 +66,7 @@ fn room() -> Option<usize> {
 ///
 /// # Errors
 /// Returns an error if the system has no threads left.
-pub fn start<T: Send + 'static>(
+pub(crate) fn start<T: Send + 'static>(
     name: &str,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Result<JoinHandle<T>, Error> {
@@ -77,7 +77,7 @@ pub fn start<T: Send + 'static>(
 ///
 /// # Errors
 /// Returns an error if the system has too few threads left; then nothing is done.
-pub fn at_once(threads: usize, work: impl Fn() + Sync) -> Result<(), Error> {
+pub(crate) fn at_once(threads: usize, work: impl Fn() + Sync) -> Result<(), Error> {
     // Workers read it only after all of them have started.
     let all_there = RwLock::new(false);
     let worker = || {

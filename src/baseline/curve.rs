@@ -31,7 +31,7 @@ impl fmt::Display for Crossing {
 
 /// Returns c0, c1, c2 of the least-squares parabola c0 + c1·x + c2·x² through points; `None` for
 /// fewer than three different x.
-pub fn parabola(points: &[(f64, f64)]) -> Option<[f64; 3]> {
+pub(crate) fn parabola(points: &[(f64, f64)]) -> Option<[f64; 3]> {
     let mut xs: Vec<f64> = points.iter().map(|point| point.0).collect();
     xs.sort_by(f64::total_cmp);
     xs.dedup();
@@ -50,7 +50,7 @@ pub fn parabola(points: &[(f64, f64)]) -> Option<[f64; 3]> {
 }
 
 /// Returns the smallest x in [from, to] at which a parabola reaches a value; `None` if none does.
-pub fn first_crossing([c0, c1, c2]: [f64; 3], value: f64, (from, to): (f64, f64)) -> Option<Crossing> {
+pub(crate) fn first_crossing([c0, c1, c2]: [f64; 3], value: f64, (from, to): (f64, f64)) -> Option<Crossing> {
     let at = |x: f64| c0 + x * (c1 + x * c2);
     if at(from) > value {
         return Some(Crossing::Below { below: from });
@@ -75,7 +75,7 @@ pub fn first_crossing([c0, c1, c2]: [f64; 3], value: f64, (from, to): (f64, f64)
 }
 
 /// Returns the first x at which a point is at or above a value; `None` if none is.
-pub fn first_of(points: &[(f64, f64)], value: f64) -> Option<Crossing> {
+pub(crate) fn first_of(points: &[(f64, f64)], value: f64) -> Option<Crossing> {
     let place = points.iter().position(|(_, y)| *y >= value)?;
     let (x, y) = points[place];
     Some(if place == 0 && y > value { Crossing::Below { below: x } } else { Crossing::At(x) })

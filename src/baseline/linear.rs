@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// A stimulus with its class.
-pub type LabelledPixels<'a> = (&'a Grid<f64>, u8);
+pub(crate) type LabelledPixels<'a> = (&'a Grid<f64>, u8);
 
 /// Weight of the penalty on the size of the weights, relative to the mean square of a pixel over
 /// the images: enough for pixels that are always dark.
@@ -15,7 +15,7 @@ const RIDGE: f64 = 1e-3;
 
 /// Sums over the training images of each class: all that least squares need.
 #[derive(Clone, Debug)]
-pub struct PixelMoments {
+pub(crate) struct PixelMoments {
     /// Number of pixels of an image, plus one for the constant 1.
     size: usize,
     /// Sum of *x xᵀ* over a class's images; its last column is the sum of *x*.
@@ -24,7 +24,7 @@ pub struct PixelMoments {
 
 /// A linear function of the pixels.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Linear {
+pub(crate) struct Linear {
     weights: DVector<f64>,
 }
 
@@ -37,7 +37,7 @@ fn sparse(stimulus: &Grid<f64>) -> Vec<(usize, f64)> {
 
 impl PixelMoments {
     /// Sums up training images, all of one size.
-    pub fn new(images: &[LabelledPixels]) -> Self {
+    pub(crate) fn new(images: &[LabelledPixels]) -> Self {
         let size = images.first().map_or(0, |(stimulus, _)| stimulus.cells().len()) + 1;
         let mut classes: Vec<u8> = images.iter().map(|(_, class)| *class).collect();
         classes.sort_unstable();
@@ -60,7 +60,7 @@ impl PixelMoments {
 
     /// Returns the linear function closest in square to 1 under images of one group's classes, and
     /// to −1 under those of the other's; with a small penalty on its weights.
-    pub fn apart(&self, first: &[u8], second: &[u8]) -> Linear {
+    pub(crate) fn apart(&self, first: &[u8], second: &[u8]) -> Linear {
         let mut square = DMatrix::zeros(self.size, self.size);
         let mut towards = DVector::zeros(self.size);
         for (classes, sign) in [(first, 1.0), (second, -1.0)] {
@@ -82,7 +82,7 @@ impl PixelMoments {
 
 impl Linear {
     /// Returns its value for an image: about 1 for the first group, −1 for the second.
-    pub fn value(&self, stimulus: &Grid<f64>) -> f64 {
+    pub(crate) fn value(&self, stimulus: &Grid<f64>) -> f64 {
         sparse(stimulus).into_iter().map(|(place, value)| self.weights[place] * value).sum()
     }
 }

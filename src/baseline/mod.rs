@@ -1,12 +1,12 @@
 //! Baselines for robots: networks (paper, "Morphological cognition capacity"), linear classifiers
 //! and the nearest image.
 
-pub mod curve;
-pub mod linear;
-pub mod nearest;
-pub mod network;
-pub mod settings;
-pub mod training;
+pub(crate) mod curve;
+pub(crate) mod linear;
+pub(crate) mod nearest;
+pub(crate) mod network;
+pub(crate) mod settings;
+pub(crate) mod training;
 
-pub use settings::{Activation, Hyperparameters, NetworkKind, Pooling, Trained, Watch};
-pub use training::{Samples, SamplesError, train};
+pub(crate) use settings::{Hyperparameters, NetworkKind, Pooling, Trained};
+pub(crate) use training::{Samples, train};

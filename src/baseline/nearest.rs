@@ -6,7 +6,7 @@ use crate::base::Grid;
 /// Returns the label of the known image nearest to an image (Euclidean distance), `None` without
 /// any. If several are equally near, as is common with few sensors, returns their most frequent
 /// label; the first one wins a tie.
-pub fn nearest<'a, L: Copy + PartialEq>(
+pub(crate) fn nearest<'a, L: Copy + PartialEq>(
     known: impl IntoIterator<Item = (&'a Grid<f64>, L)>,
     image: &Grid<f64>,
 ) -> Option<L> {

@@ -54,23 +54,23 @@ impl Pooling {
 
 /// Shape of a network: all that determines it besides its parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shape {
+pub(crate) struct Shape {
     /// Its kind.
-    pub kind: NetworkKind,
+    pub(crate) kind: NetworkKind,
     /// Number of hidden neurons or kernels, 1 or more.
-    pub size: usize,
+    pub(crate) size: usize,
     /// Rows and columns of an image.
-    pub image: (usize, usize),
+    pub(crate) image: (usize, usize),
     /// Side of a convolution's kernels, at most the image's.
-    pub kernel: usize,
+    pub(crate) kernel: usize,
     /// The function that follows the hidden layer.
-    pub activation: Activation,
+    pub(crate) activation: Activation,
     /// Reduction of a convolution's maps.
-    pub pooling: Pooling,
+    pub(crate) pooling: Pooling,
 }
 
 /// Number of outputs: the two groups of a task.
-pub const OUTPUTS: usize = 2;
+pub(crate) const OUTPUTS: usize = 2;
 
 impl Shape {
     /// Returns the rows and columns of an image that a hidden unit covers at one place.
@@ -124,7 +124,7 @@ impl Shape {
     ///
     /// # Panics
     /// If the image does not have the shape's size.
-    pub fn patches(&self, image: &Grid<f64>) -> Patches {
+    pub(crate) fn patches(&self, image: &Grid<f64>) -> Patches {
         assert_eq!((image.height(), image.width()), self.image, "an image of the shape's size");
         let [window, pooled] = self.pooled();
         let grid = |(rows, columns): (usize, usize)| {
@@ -146,7 +146,7 @@ impl Shape {
 
 /// An image as the inputs of a network's hidden units.
 #[derive(Clone, Debug)]
-pub struct Patches {
+pub(crate) struct Patches {
     /// End of each place's pixels in `lit`; places that pooling reduces to one are neighbours.
     ends: Vec<usize>,
     /// Index of the pixel within its place, and its value.
@@ -162,7 +162,7 @@ impl Patches {
 
 /// A network with two outputs.
 #[derive(Clone, Debug)]
-pub struct Network {
+pub(crate) struct Network {
     shape: Shape,
     parameters: DVector<f64>,
     /// Activations of the hidden units, by place, then by unit.
@@ -174,7 +174,7 @@ pub struct Network {
 impl Network {
     /// Makes a network with random parameters: uniform within ±1/√(inputs of a unit), as PyTorch
     /// initialises such layers.
-    pub fn new(shape: Shape, rng: &mut Stream) -> Self {
+    pub(crate) fn new(shape: Shape, rng: &mut Stream) -> Self {
         let [hidden, biases, weights, output_biases] = shape.layout();
         let (size, features) = (shape.size, shape.features());
         let mut parameters = DVector::zeros(output_biases.end);
@@ -199,12 +199,12 @@ impl Network {
     }
 
     /// Returns the trained parameters.
-    pub fn parameters(&self) -> &DVector<f64> {
+    pub(crate) fn parameters(&self) -> &DVector<f64> {
         &self.parameters
     }
 
     /// Returns the trained parameters, mutably.
-    pub fn parameters_mut(&mut self) -> &mut DVector<f64> {
+    pub(crate) fn parameters_mut(&mut self) -> &mut DVector<f64> {
         &mut self.parameters
     }
 
@@ -215,7 +215,7 @@ impl Network {
     }
 
     /// Computes the outputs for an image, before the softmax.
-    pub fn forward(&mut self, image: &Patches) -> [f64; OUTPUTS] {
+    pub(crate) fn forward(&mut self, image: &Patches) -> [f64; OUTPUTS] {
         let Shape { size, activation, .. } = self.shape;
         let [hidden, biases, _, output_biases] = self.shape.layout();
         let hidden = &self.parameters.as_slice()[hidden];
@@ -239,7 +239,7 @@ impl Network {
 
     /// Adds to `gradient` a loss's derivatives by the parameters, given those by the outputs, for
     /// the last image of [`forward`](Network::forward).
-    pub fn backward(&self, image: &Patches, outputs: [f64; OUTPUTS], gradient: &mut DVector<f64>) {
+    pub(crate) fn backward(&self, image: &Patches, outputs: [f64; OUTPUTS], gradient: &mut DVector<f64>) {
         let Shape { size, activation, pooling, .. } = self.shape;
         let [hidden, biases, weights, output_biases] = self.shape.layout();
         let features = self.shape.features();
@@ -361,7 +361,7 @@ fn add_scaled(sums: &mut [f64], factor: f64, terms: &[f64]) {
 }
 
 /// Returns the cross-entropy of outputs against an image's group, and its derivatives by them.
-pub fn cross_entropy(outputs: [f64; OUTPUTS], group: usize) -> (f64, [f64; OUTPUTS]) {
+pub(crate) fn cross_entropy(outputs: [f64; OUTPUTS], group: usize) -> (f64, [f64; OUTPUTS]) {
     let largest = outputs.into_iter().fold(f64::NEG_INFINITY, f64::max);
     let powers = outputs.map(|output| libm::exp(output - largest));
     let sum: f64 = powers.iter().sum();

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Kinds of network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum NetworkKind {
+pub(crate) enum NetworkKind {
     /// One hidden layer; its size is the number of hidden neurons.
     Mlp,
     /// One convolution and an output head; its size is the number of kernels.
@@ -15,10 +15,10 @@ pub enum NetworkKind {
 
 impl NetworkKind {
     /// All kinds.
-    pub const ALL: [NetworkKind; 2] = [NetworkKind::Mlp, NetworkKind::Cnn];
+    pub(crate) const ALL: [NetworkKind; 2] = [NetworkKind::Mlp, NetworkKind::Cnn];
 
     /// Returns its name in files.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             NetworkKind::Mlp => "mlp",
             NetworkKind::Cnn => "cnn",
@@ -29,7 +29,7 @@ impl NetworkKind {
 /// The function after the hidden layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum Activation {
+pub(crate) enum Activation {
     /// max(0, x)
     Relu,
     /// tanh(x)
@@ -41,7 +41,7 @@ pub enum Activation {
 /// The reduction of a convolution's maps before the output head.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum Pooling {
+pub(crate) enum Pooling {
     /// No reduction: every pixel of every map is an input of the head.
     None,
     /// The maximum of each 2 × 2 pixels.
@@ -55,7 +55,7 @@ pub enum Pooling {
 /// The measure whose improvement training waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum Watch {
+pub(crate) enum Watch {
     /// Fraction of correct answers: larger is better.
     Accuracy,
     /// Cross-entropy: smaller is better.
@@ -65,25 +65,25 @@ pub enum Watch {
 /// Settings of the training of networks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct Hyperparameters {
+pub(crate) struct Hyperparameters {
     /// Most passes over the training images. Default 50, the paper's.
-    pub epochs: usize,
+    pub(crate) epochs: usize,
     /// Epochs without an improvement after which training ends. Default 5, the paper's.
-    pub patience: usize,
+    pub(crate) patience: usize,
     /// Measure of improvement. Default accuracy.
-    pub watch: Watch,
+    pub(crate) watch: Watch,
     /// True to test the best epoch's network instead of the last epoch's. Default false.
-    pub restore_best: bool,
+    pub(crate) restore_best: bool,
     /// Learning rate of Adam. Default 0.0005.
-    pub learning_rate: f64,
+    pub(crate) learning_rate: f64,
     /// Images per step; 0 means all at once. Default 1.
-    pub batch: usize,
+    pub(crate) batch: usize,
     /// Function after the hidden layer. Default relu.
-    pub activation: Activation,
+    pub(crate) activation: Activation,
     /// Side of the convolution's kernels. Default 3.
-    pub kernel: usize,
+    pub(crate) kernel: usize,
     /// Reduction of the convolution's maps. Default none.
-    pub pooling: Pooling,
+    pub(crate) pooling: Pooling,
 }
 
 impl Default for Hyperparameters {
@@ -104,11 +104,11 @@ impl Default for Hyperparameters {
 
 /// The result of a training.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Trained {
+pub(crate) struct Trained {
     /// Fraction of the test images answered correctly.
-    pub accuracy: f64,
+    pub(crate) accuracy: f64,
     /// Epochs trained.
-    pub epochs: usize,
+    pub(crate) epochs: usize,
     /// Number of trained parameters.
-    pub parameters: usize,
+    pub(crate) parameters: usize,
 }

@@ -10,7 +10,7 @@ use nalgebra::DVector;
 
 /// Images with their groups (0 or 1), prepared for networks of a kind.
 #[derive(Clone, Debug)]
-pub struct Samples {
+pub(crate) struct Samples {
     images: Vec<(Patches, usize)>,
     /// The networks' shape, except for their size.
     shape: Shape,
@@ -18,7 +18,7 @@ pub struct Samples {
 
 /// The reason why images make no samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum SamplesError {
+pub(crate) enum SamplesError {
     /// There are no images.
     #[error("expected images, found none")]
     Empty,
@@ -37,7 +37,7 @@ impl Samples {
     ///
     /// # Errors
     /// Returns an error if there are no images, or if they differ in size.
-    pub fn new(
+    pub(crate) fn new(
         images: &[(&Grid<f64>, usize)],
         kind: NetworkKind,
         hyper: &Hyperparameters,
@@ -108,7 +108,7 @@ impl Adam {
 ///
 /// # Errors
 /// Returns [`Stopped`] if `stop` is set in the meantime; every image checks it.
-pub fn train(
+pub(crate) fn train(
     size: usize,
     hyper: &Hyperparameters,
     training: &Samples,
@@ -222,7 +222,8 @@ mod tests {
     /// A change of one bit in any parameter, of any kind of layer, changes this hash.
     #[test]
     fn trained_parameters_are_pinned_to_the_bit() {
-        use crate::baseline::{Activation, Pooling};
+        use crate::baseline::Pooling;
+        use crate::baseline::settings::Activation;
         let mut bits = String::new();
         for kind in NetworkKind::ALL {
             for (activation, pooling) in [

@@ -472,7 +472,7 @@ fn dataset() -> impl TypedValueParser<Value = String> {
 
 impl Cli {
     /// Returns the mode of the console.
-    pub fn mode(&self) -> Mode {
+    pub(crate) fn mode(&self) -> Mode {
         match (self.quiet, self.json) {
             (true, _) => Mode::Quiet,
             (_, true) => Mode::Json,

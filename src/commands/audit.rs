@@ -62,13 +62,13 @@ pub struct AuditOptions {
 #[derive(Clone, Debug)]
 pub struct AuditOutcome {
     /// The content of audit.json.
-    pub file: AuditFile,
+    pub(crate) file: AuditFile,
     /// Ids of the requested robots.
-    pub asked: Vec<String>,
+    pub(crate) asked: Vec<String>,
     /// Number of these that already had verdicts and were skipped.
-    pub known: usize,
+    pub(crate) known: usize,
     /// Path of the verdicts that came with the run, if any were used.
-    pub shipped: Option<PathBuf>,
+    pub(crate) shipped: Option<PathBuf>,
     /// True if a signal stopped the audit before its last robot.
     pub stopped: bool,
     /// The error if the verdicts could not be written, or only in part.

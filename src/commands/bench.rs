@@ -18,20 +18,20 @@ pub struct Specimen {
 
 /// Simulation speed of one body, on one core.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Speed {
+pub(crate) struct Speed {
     /// Name of the specimen.
-    pub body: &'static str,
+    pub(crate) body: &'static str,
     /// Number of its voxels.
-    pub voxels: usize,
+    pub(crate) voxels: usize,
     /// Instruction set.
-    pub instruction_set: &'static str,
+    pub(crate) instruction_set: &'static str,
     /// Clock: "processor" is the processor time of the thread, which other load does not change;
     /// "wall" where the system has no such clock.
-    pub clock: &'static str,
+    pub(crate) clock: &'static str,
     /// Microseconds per substep, the median of the repetitions.
-    pub microseconds: f64,
+    pub(crate) microseconds: f64,
     /// Control steps per second.
-    pub control_steps: f64,
+    pub(crate) control_steps: f64,
 }
 
 /// Material by row and column.
@@ -75,7 +75,7 @@ const WARM_UP: u32 = 50;
 
 /// Measures a body on an instruction set. Repeats fifty control steps of one rollout up to
 /// `repetitions` times, for about two seconds at most, and takes the median.
-pub fn measure(specimen: &Specimen, set: InstructionSet, repetitions: usize) -> Speed {
+pub(crate) fn measure(specimen: &Specimen, set: InstructionSet, repetitions: usize) -> Speed {
     let physics = Physics::default();
     let start = Start { column: 493, row: physics.ground_row };
     let system = System::new(&specimen.body, physics.clone());
@@ -116,7 +116,7 @@ const REPETITIONS: usize = 101;
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Measures all specimens on some instruction sets, one after the other.
-pub fn table(sets: &[InstructionSet]) -> Vec<Speed> {
+pub(crate) fn table(sets: &[InstructionSet]) -> Vec<Speed> {
     let measured =
         |set: &InstructionSet| specimens().iter().map(|s| measure(s, *set, REPETITIONS)).collect::<Vec<_>>();
     sets.iter().flat_map(measured).collect()

@@ -31,7 +31,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// File endings of the figure beside the results.
-pub const FIGURES: [&str; 2] = ["svg", "png"];
+pub(crate) const FIGURES: [&str; 2] = ["svg", "png"];
 
 /// Options of the comparison with networks.
 #[derive(Clone, Debug)]
@@ -52,7 +52,7 @@ pub struct CapacityOutcome {
     /// The content of capacity.json.
     pub file: CapacityFile,
     /// The error if results or trainings could not be written, or only in part.
-    pub unwritten: Option<Error>,
+    pub(crate) unwritten: Option<Error>,
 }
 
 /// Finds the capacity of evaluated robots. Trainings are kept beside the results and reused.

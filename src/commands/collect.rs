@@ -22,7 +22,7 @@ use std::path::PathBuf;
 ///
 /// # Errors
 /// Returns an error if a run is broken.
-pub fn collect(
+pub(crate) fn collect(
     tasks: &[Task],
     status: &[TaskStatus],
     place: &TaskFolders,

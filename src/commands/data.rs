@@ -8,22 +8,22 @@ use std::collections::BTreeMap;
 
 /// Description of a dataset (`morphcog data info`).
 #[derive(Debug)]
-pub struct FoundDataset {
+pub(crate) struct FoundDataset {
     /// Name, folder and usable splits.
-    pub info: DatasetInfo,
+    pub(crate) info: DatasetInfo,
     /// Names of its files that are identical to the published ones.
-    pub published: Vec<String>,
+    pub(crate) published: Vec<String>,
     /// Splits that belong to a dataset known by another name, with that name.
-    pub others: BTreeMap<Split, &'static str>,
+    pub(crate) others: BTreeMap<Split, &'static str>,
     /// Unusable splits, each with the reason.
-    pub problems: Vec<(Split, DatasetError)>,
+    pub(crate) problems: Vec<(Split, DatasetError)>,
 }
 
 /// Inspects each split by itself, since one may be missing. `transpose`: see [`Dataset::oriented`].
 ///
 /// # Errors
 /// Returns the error of the training images if neither split can be loaded.
-pub fn info(
+pub(crate) fn info(
     name: &str,
     given: &[DatasetPlace],
     transpose: Option<bool>,

@@ -69,7 +69,7 @@ impl EvalOptions {
 #[derive(Clone, Debug)]
 pub struct EvalOutcome {
     /// The content of eval.json.
-    pub file: EvalFile,
+    pub(crate) file: EvalFile,
     /// The error if the results could not be written, or only in part.
     pub unwritten: Option<Error>,
 }

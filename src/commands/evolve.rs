@@ -39,9 +39,9 @@ pub struct EvolveOutcome {
     /// The run as written to `run.json`.
     pub run: RunFile,
     /// Counts of the whole run.
-    pub totals: Totals,
+    pub(crate) totals: Totals,
     /// Height and width of the training images.
-    pub size: [usize; 2],
+    pub(crate) size: [usize; 2],
     /// Best robots of each task on validation images, best first; empty if the config wants none,
     /// or if it was stopped.
     pub validated: Vec<Validated>,

@@ -17,35 +17,35 @@ pub const PAPER_TOML: (&str, &str) = ("paper.toml", include_str!("../../configs/
 /// Plan of a reproduction: its experiments, and how their robots are tested.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct PaperPlan {
+pub(crate) struct PaperPlan {
     /// Seeds of each experiment's runs.
-    pub seeds: Vec<u64>,
+    pub(crate) seeds: Vec<u64>,
     /// Number of robots tested per task.
-    pub robots: usize,
+    pub(crate) robots: usize,
     /// Number of test images.
-    pub images: usize,
+    pub(crate) images: usize,
     /// The experiments.
-    pub experiment: Vec<Experiment>,
+    pub(crate) experiment: Vec<Experiment>,
     /// Criteria of the audits.
     #[serde(default)]
-    pub audit: Criteria,
+    pub(crate) audit: Criteria,
     /// Networks to compare robots with.
     #[serde(default)]
-    pub capacity: CapacityConfig,
+    pub(crate) capacity: CapacityConfig,
     /// Folder of the plan, to which paths of configs are relative.
     #[serde(skip)]
-    pub folder: PathBuf,
+    pub(crate) folder: PathBuf,
 }
 
 /// An experiment: a config and changes to it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Experiment {
+pub(crate) struct Experiment {
     /// A config file, relative to the plan's folder, or the name of a built-in one.
-    pub config: String,
+    pub(crate) config: String,
     /// Changes, as with `--set`.
     #[serde(default)]
-    pub set: Vec<String>,
+    pub(crate) set: Vec<String>,
 }
 
 /// Fewest test images and trainings at small scales.
@@ -53,13 +53,13 @@ const LEAST: [usize; 2] = [100, 5];
 
 impl PaperPlan {
     /// Returns true if a name means the built-in plan, and no file.
-    pub fn is_built_in(name: &str) -> bool {
+    pub(crate) fn is_built_in(name: &str) -> bool {
         let own = PAPER_TOML.0;
         (name == own || own.strip_suffix(".toml") == Some(name)) && !Path::new(name).exists()
     }
 
     /// Returns the plan as TOML, with the value of every key.
-    pub fn to_toml(&self) -> String {
+    pub(crate) fn to_toml(&self) -> String {
         toml::to_string_pretty(self).expect("every field is a number, text, list or table, which TOML has")
     }
 
@@ -67,7 +67,7 @@ impl PaperPlan {
     ///
     /// # Errors
     /// Returns an error with file, line and key if the plan is wrong.
-    pub fn load(name: &str, overrides: &[String]) -> Result<Self, Error> {
+    pub(crate) fn load(name: &str, overrides: &[String]) -> Result<Self, Error> {
         let text = match read_given(Path::new(name)) {
             Err(_) if PaperPlan::is_built_in(name) => PAPER_TOML.1.to_string(),
             Err(error) => return Err(Error::reading(Path::new(name), &error)),

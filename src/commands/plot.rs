@@ -43,7 +43,7 @@ pub enum FigureKind {
 
 impl FigureKind {
     /// All kinds with their names.
-    pub const ALL: [(FigureKind, &str); 7] = [
+    pub(crate) const ALL: [(FigureKind, &str); 7] = [
         (FigureKind::Body, "body"),
         (FigureKind::Spacetime, "spacetime"),
         (FigureKind::Snapshots, "snapshots"),
@@ -54,7 +54,7 @@ impl FigureKind {
     ];
 
     /// Returns true if the figure shows one robot.
-    pub fn is_of_robot(self) -> bool {
+    pub(crate) fn is_of_robot(self) -> bool {
         matches!(self, FigureKind::Body | FigureKind::Spacetime | FigureKind::Snapshots)
     }
 }
@@ -99,9 +99,9 @@ pub struct PlotOptions {
 #[derive(Clone, Debug)]
 pub struct PlotOutcome {
     /// Their paths.
-    pub files: Vec<PathBuf>,
+    pub(crate) files: Vec<PathBuf>,
     /// The runs in a figure of progress.
-    pub progress: Vec<Progress>,
+    pub(crate) progress: Vec<Progress>,
 }
 
 /// A figure and its file without the extension.
@@ -230,7 +230,7 @@ fn possible(figure: &Figure, dpi: u32) -> Result<(), Error> {
 ///
 /// # Errors
 /// Returns an error if the extension is not that of a figure.
-pub fn endings(out: Option<&Path>) -> Result<Vec<&'static str>, Error> {
+pub(crate) fn endings(out: Option<&Path>) -> Result<Vec<&'static str>, Error> {
     let Some(path) = out else { return Ok(vec!["svg", "png"]) };
     folder::of_file(path)?;
     match path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).as_deref() {
@@ -252,7 +252,7 @@ fn with_ending(stem: &Path, ending: &str) -> PathBuf {
 }
 
 /// Returns the error for a robot named with a kind of figure that shows none.
-pub fn no_robot(kind: FigureKind) -> Error {
+pub(crate) fn no_robot(kind: FigureKind) -> Error {
     let of_robots = FigureKind::ALL.iter().filter(|(kind, _)| kind.is_of_robot()).map(|(_, name)| *name);
     let of_robots = of_robots.collect::<Vec<_>>().join(", ");
     let text = format!("plot {kind} shows no single robot; expected with {of_robots} only");

@@ -20,15 +20,15 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 /// Most images in one recording, since pictures hold every frame.
-pub const MAX_IMAGES: usize = 20;
+pub(crate) const MAX_IMAGES: usize = 20;
 
 /// An image by split and index: `train:3`, `test:17`; without a word, a training image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ShownImage {
     /// Its split.
-    pub split: Split,
+    pub(crate) split: Split,
     /// Its index there.
-    pub index: usize,
+    pub(crate) index: usize,
 }
 
 impl FromStr for ShownImage {
@@ -76,11 +76,11 @@ pub struct Replay {
 
 /// A robot and its images, before the simulation.
 #[derive(Clone, Debug)]
-pub struct ReplaySubject {
+pub(crate) struct ReplaySubject {
     /// The robot.
-    pub found: FoundRobot,
+    pub(crate) found: FoundRobot,
     /// Images as it sees them.
-    pub images: Vec<LabelledStimulus>,
+    pub(crate) images: Vec<LabelledStimulus>,
 }
 
 /// Records a robot's rollout under the protocol of its config.
@@ -105,7 +105,7 @@ pub fn replay(options: &ReplayOptions) -> Result<Replay, Error> {
 }
 
 /// Records a subject's rollout.
-pub fn record_subject(subject: &ReplaySubject) -> Recording {
+pub(crate) fn record_subject(subject: &ReplaySubject) -> Recording {
     let ReplaySubject { found: FoundRobot { name, body, config, judge, .. }, images } = subject;
     let fresh = config.protocol.rollout == RolloutMode::Fresh;
     let recording = record(name, body, &config.physics, &config.protocol, fresh, images);
@@ -116,7 +116,7 @@ pub fn record_subject(subject: &ReplaySubject) -> Recording {
 ///
 /// # Errors
 /// Returns an error if the robot, archive, images or data are wrong.
-pub fn subject(options: &ReplayOptions) -> Result<ReplaySubject, Error> {
+pub(crate) fn subject(options: &ReplayOptions) -> Result<ReplaySubject, Error> {
     let mut found = find(options)?;
     let config = &mut found.config;
     if let Some(dataset) = &options.dataset {
@@ -184,24 +184,24 @@ pub struct FoundRobot {
     /// Its id.
     pub name: String,
     /// Its body.
-    pub body: Body,
+    pub(crate) body: Body,
     /// The config it evolved with.
-    pub config: Config,
+    pub(crate) config: Config,
     /// Its training images, as far as known.
-    pub training: Vec<ImageRef>,
+    pub(crate) training: Vec<ImageRef>,
     /// Dataset of these images.
-    pub dataset: Option<DatasetRef>,
+    pub(crate) dataset: Option<DatasetRef>,
     /// Description on a page: words and values.
-    pub about: Vec<(String, String)>,
+    pub(crate) about: Vec<(String, String)>,
     /// Rule that turns its walks into answers.
     judge: Option<Readout>,
     /// The run.json it comes from.
-    pub archive: PathBuf,
+    pub(crate) archive: PathBuf,
 }
 
 impl FoundRobot {
     /// Returns the title of its picture, one line: robot, run and seed.
-    pub fn title(&self) -> String {
+    pub(crate) fn title(&self) -> String {
         let word = |key: &str| self.about.iter().find(|(word, _)| word == key).map_or("", |(_, value)| value);
         format!("robot {}, {}", word("Robot"), word("From"))
     }

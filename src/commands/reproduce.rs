@@ -29,39 +29,39 @@ use std::sync::atomic::Ordering;
 
 /// Options of a reproduction.
 #[derive(Clone, Debug)]
-pub struct ReproduceOptions {
+pub(crate) struct ReproduceOptions {
     /// The plan.
-    pub plan: PaperPlan,
+    pub(crate) plan: PaperPlan,
     /// Its scale, above 0 and up to 1.
-    pub scale: f64,
+    pub(crate) scale: f64,
     /// Folders of the results.
-    pub place: TaskFolders,
+    pub(crate) place: TaskFolders,
     /// Runs at once; `None`: one per core.
-    pub jobs: Option<usize>,
+    pub(crate) jobs: Option<usize>,
 }
 
 /// Result of a reproduction.
 #[derive(Clone, Debug)]
-pub struct ReproduceOutcome {
+pub(crate) struct ReproduceOutcome {
     /// Summary of the runs; the table is made when all are done.
-    pub runs: TasksSummary,
+    pub(crate) runs: TasksSummary,
     /// The paper's table so far.
-    pub rows: Vec<TableRow>,
+    pub(crate) rows: Vec<TableRow>,
     /// Files written at the end.
-    pub files: Vec<PathBuf>,
+    pub(crate) files: Vec<PathBuf>,
     /// Networks of every experiment, with their file.
-    pub capacities: Vec<(PathBuf, CapacityFile)>,
+    pub(crate) capacities: Vec<(PathBuf, CapacityFile)>,
     /// True if a signal stopped it.
-    pub stopped: bool,
+    pub(crate) stopped: bool,
     /// The error if the table could not be written, or only in part.
-    pub unwritten: Option<Error>,
+    pub(crate) unwritten: Option<Error>,
 }
 
 /// Returns the runs of a plan at a scale: every experiment from every seed.
 ///
 /// # Errors
 /// Returns an error if the scale or plan is wrong.
-pub fn tasks(plan: &PaperPlan, scale: f64) -> Result<Vec<Task>, Error> {
+pub(crate) fn tasks(plan: &PaperPlan, scale: f64) -> Result<Vec<Task>, Error> {
     if !(scale > 0.0 && scale <= 1.0) {
         return Err(Error::argument("scale", scale, "expected more than 0, up to 1"));
     }
@@ -87,7 +87,7 @@ pub fn tasks(plan: &PaperPlan, scale: f64) -> Result<Vec<Task>, Error> {
 ///
 /// # Errors
 /// Returns an error if a check, or a step after the runs, fails.
-pub fn reproduce(options: &ReproduceOptions, session: &Session) -> Result<ReproduceOutcome, Error> {
+pub(crate) fn reproduce(options: &ReproduceOptions, session: &Session) -> Result<ReproduceOutcome, Error> {
     let tasks = tasks(&options.plan, options.scale)?;
     let place = &options.place;
     tasks::check_folders(&tasks, place).map_err(|mut refused| refused.swap_remove(0))?;

@@ -42,7 +42,7 @@ use std::path::PathBuf;
 
 /// Rollouts between two checks of the slopes' error, and fewest of a robot: ten under each of six
 /// conditions. Larger batches overshoot; smaller ones leave cores idle at their ends.
-pub const BATCH: usize = 60;
+pub(crate) const BATCH: usize = 60;
 
 /// Most training images per class of a task. More cost time, and hardly narrow the interval of the
 /// estimated accuracy.
@@ -53,38 +53,38 @@ const LEAST_PER_CLASS: usize = 4;
 
 /// Options of a measurement.
 #[derive(Clone, Debug)]
-pub struct ResponseOptions {
+pub(crate) struct ResponseOptions {
     /// The run.json.
-    pub archive: PathBuf,
+    pub(crate) archive: PathBuf,
     /// Names of the robots to measure.
-    pub robots: Vec<String>,
+    pub(crate) robots: Vec<String>,
     /// True if only robots count that an audit found physical.
-    pub physical_only: bool,
+    pub(crate) physical_only: bool,
     /// Two groups of classes, to estimate the accuracy that training could reach.
-    pub task: Option<Groups>,
+    pub(crate) task: Option<Groups>,
     /// Config keys that a training would change, as `stimulus.margin=5`; only with a task.
-    pub set: Vec<String>,
+    pub(crate) set: Vec<String>,
     /// Most rollouts per robot.
-    pub images: usize,
+    pub(crate) images: usize,
     /// Relative error of the slopes at which a measurement ends.
-    pub error: f64,
+    pub(crate) error: f64,
     /// Seed of the random images; `None`: the run's, as in `train`.
-    pub seed: Option<u64>,
+    pub(crate) seed: Option<u64>,
     /// Path of the results (response.json; CSV and pictures go beside it).
-    pub out: PathBuf,
+    pub(crate) out: PathBuf,
 }
 
 /// Result of a measurement.
 #[derive(Clone, Debug)]
-pub struct ResponseOutcome {
+pub(crate) struct ResponseOutcome {
     /// The content of response.json.
-    pub file: ResponseFile,
+    pub(crate) file: ResponseFile,
     /// Pictures of its robots, still to be drawn.
-    pub pictures: Vec<[PathBuf; 2]>,
+    pub(crate) pictures: Vec<[PathBuf; 2]>,
     /// True if a signal stopped it before the last robot.
-    pub stopped: bool,
+    pub(crate) stopped: bool,
     /// The error if the results could not be written, or only in part.
-    pub unwritten: Option<Error>,
+    pub(crate) unwritten: Option<Error>,
 }
 
 /// A robot to measure.
@@ -107,7 +107,7 @@ struct Provenance {
 ///
 /// # Errors
 /// Returns an error if the archive, robots, data or options are wrong.
-pub fn measure(options: &ResponseOptions, session: &Session) -> Result<ResponseOutcome, Error> {
+pub(crate) fn measure(options: &ResponseOptions, session: &Session) -> Result<ResponseOutcome, Error> {
     check_numbers(options)?;
     let provenance = provenance(options)?;
     let config = &provenance.config;

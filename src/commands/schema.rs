@@ -25,7 +25,7 @@ pub struct Schema {
     /// Its name on the command line.
     pub name: &'static str,
     /// The files it describes.
-    pub of: &'static str,
+    pub(crate) of: &'static str,
     version: u32,
     make: fn() -> Value,
 }
@@ -58,7 +58,7 @@ impl Schema {
     ///
     /// # Errors
     /// Returns an error if there is none.
-    pub fn named(name: &str) -> Result<Self, Error> {
+    pub(crate) fn named(name: &str) -> Result<Self, Error> {
         ALL.into_iter().find(|schema| schema.name == name).ok_or_else(|| {
             let names = ALL.map(|schema| schema.name).join(", ");
             Error::usage(format!("schema {name}: expected one of {names}"))

@@ -20,7 +20,7 @@ use std::path::Path;
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
     /// The body as rows of 0…6.
-    pub body: Body,
+    pub(crate) body: Body,
     /// One stimulus for the whole simulation: H × W in [0, 1].
     stimulus: Option<Grid<f64>>,
     /// Or several, each for `switch_every` control steps; after the last, the first follows.
@@ -115,7 +115,7 @@ impl Scenario {
     ///
     /// # Errors
     /// As [`Scenario::read`].
-    pub fn parse(text: &str, name: &str) -> Result<Self, Error> {
+    pub(crate) fn parse(text: &str, name: &str) -> Result<Self, Error> {
         let scenario: Scenario = reading::read_json(text, name)?;
         scenario.check().map_err(|error| error.in_place(name))?;
         Ok(scenario)
@@ -175,22 +175,22 @@ impl Scenario {
     }
 
     /// Returns the stimuli in turn, none if all is dark.
-    pub fn stimuli(&self) -> &[Grid<f64>] {
+    pub(crate) fn stimuli(&self) -> &[Grid<f64>] {
         self.stimuli.as_deref().unwrap_or(self.stimulus.as_slice())
     }
 
     /// Returns the position where it begins.
-    pub fn start(&self) -> Start {
+    pub(crate) fn start(&self) -> Start {
         Start { column: self.start_column, row: self.start_row.unwrap_or(self.physics.ground_row) }
     }
 
     /// Returns the constants of the simulator.
-    pub fn physics(&self) -> &Physics {
+    pub(crate) fn physics(&self) -> &Physics {
         &self.physics
     }
 
     /// Returns the number of control steps.
-    pub fn control_steps(&self) -> u64 {
+    pub(crate) fn control_steps(&self) -> u64 {
         let shown = self.switch_every.map(|every| every.saturating_mul(self.stimuli().len() as u64));
         self.control_steps.or(shown).unwrap_or(CONTROL_STEPS)
     }
@@ -255,7 +255,7 @@ pub fn simulate(
 /// # Errors
 /// As [`Scenario::read`] and [`simulate`]; if the file cannot be written or is the scenario's; if
 /// the session was stopped, which leaves the file unchanged.
-pub fn to_file(from: &Path, points: bool, path: &Path, session: &Session) -> Result<(), Error> {
+pub(crate) fn to_file(from: &Path, points: bool, path: &Path, session: &Session) -> Result<(), Error> {
     let scenario = &Scenario::read(from)?;
     if path.exists() && path.canonicalize().ok() == from.canonicalize().ok() {
         let text = "expected another name: this would overwrite the scenario";
@@ -287,7 +287,7 @@ pub fn to_file(from: &Path, points: bool, path: &Path, session: &Session) -> Res
 }
 
 /// Formats a number with 17 significant digits, which identify every f64.
-pub fn digits17(value: f64) -> String {
+pub(crate) fn digits17(value: f64) -> String {
     // Makes -0 into 0.
     let value = value + 0.0;
     let before = if value == 0.0 { 0.0 } else { libm::log10(value.abs()).floor() };

@@ -27,38 +27,38 @@ const LONGEST: usize = 24;
 /// Plan of a sweep: every combination of `vary`, `groups` (or `pairs`) and `seeds` is a task.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct SweepPlan {
+pub(crate) struct SweepPlan {
     /// A config file, relative to the plan's folder, or the name of a built-in one: tasks evolve.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub config: Option<String>,
+    pub(crate) config: Option<String>,
     /// Or a run.json of gaits, or its folder, relative to the plan's folder: tasks train.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub archive: Option<PathBuf>,
+    pub(crate) archive: Option<PathBuf>,
     /// Robots of `archive` to try, as with `--robots` of `morphcog train`. Default "top:4".
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub robots: Option<String>,
+    pub(crate) robots: Option<String>,
     /// Seeds. Default: that of the config or of the archive's run.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub seeds: Vec<u64>,
+    pub(crate) seeds: Vec<u64>,
     /// Keys set in all tasks, as with `--set`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub set: Vec<String>,
+    pub(crate) set: Vec<String>,
     /// Groups of classes to tell apart, two per entry, as "4|9".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub groups: Vec<String>,
+    pub(crate) groups: Vec<String>,
     /// Classes to tell apart in pairs, each with every other, as 4|9.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub pairs: Vec<u8>,
+    pub(crate) pairs: Vec<u8>,
     /// Keys to vary, each with a list of values.
     #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
     #[schemars(with = "serde_json::Map<String, serde_json::Value>")]
-    pub vary: toml::Table,
+    pub(crate) vary: toml::Table,
     /// An audit after each run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub audit: Option<AuditStep>,
+    pub(crate) audit: Option<AuditStep>,
     /// A test on held-out images after that.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub eval: Option<EvalStep>,
+    pub(crate) eval: Option<EvalStep>,
 }
 
 /// A value of a varied key.
@@ -82,7 +82,7 @@ impl SweepPlan {
     ///
     /// # Errors
     /// Returns an error with file, line and key if the plan is wrong.
-    pub fn load(path: &Path, overrides: &[String]) -> Result<Self, Error> {
+    pub(crate) fn load(path: &Path, overrides: &[String]) -> Result<Self, Error> {
         let text = read_given(path).map_err(|error| {
             let schema = Remedy::Run(Invocation::new("schema").value("sweep"), "says what a plan holds");
             let help = Remedy::Run(Invocation::new("help").value("sweep"), "shows one");
@@ -192,7 +192,7 @@ impl SweepPlan {
     ///
     /// # Errors
     /// Returns everything that is wrong with the plan, or with its tasks, at once.
-    pub fn tasks(&self, path: &Path) -> Result<Vec<Task>, Vec<Error>> {
+    pub(crate) fn tasks(&self, path: &Path) -> Result<Vec<Task>, Vec<Error>> {
         let one = |error: Error| vec![error.in_place(&path.display().to_string())];
         let sets = |wanted: &dyn Fn(&str) -> bool| {
             self.set.iter().any(|set| set.split('=').next().is_some_and(|key| wanted(key.trim())))

@@ -12,35 +12,35 @@ use std::path::{Path, PathBuf};
 
 /// A row of the table: one task.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct TableRow {
+pub(crate) struct TableRow {
     /// The task, as "0|1".
-    pub task: String,
+    pub(crate) task: String,
     /// Number of robots tested.
-    pub robots: usize,
+    pub(crate) robots: usize,
     /// Number of physical ones among them.
-    pub physical: usize,
+    pub(crate) physical: usize,
     /// Number of robots audited to find them.
-    pub audited: usize,
+    pub(crate) audited: usize,
     /// Their mean accuracy \[%\]; `None` without robots.
-    pub accuracy: Option<f64>,
+    pub(crate) accuracy: Option<f64>,
     /// Its standard deviation over the robots \[%\].
-    pub deviation: Option<f64>,
+    pub(crate) deviation: Option<f64>,
     /// Its 95 % bootstrap interval \[%\].
-    pub interval: Option<[f64; 2]>,
+    pub(crate) interval: Option<[f64; 2]>,
     /// Mean balanced accuracy \[%\].
-    pub balanced_accuracy: Option<f64>,
+    pub(crate) balanced_accuracy: Option<f64>,
     /// Accuracy of always answering the larger group \[%\].
-    pub larger_group: Option<f64>,
+    pub(crate) larger_group: Option<f64>,
     /// Capacity in neurons; `None` without a match.
-    pub mlp: Option<Crossing>,
+    pub(crate) mlp: Option<Crossing>,
     /// Capacity in kernels; `None` without a match.
-    pub cnn: Option<Crossing>,
+    pub(crate) cnn: Option<Crossing>,
     /// The paper's accuracy \[%\].
-    pub paper_accuracy: Option<f64>,
+    pub(crate) paper_accuracy: Option<f64>,
     /// The paper's capacity in neurons; `None` without a match.
-    pub paper_mlp: Option<f64>,
+    pub(crate) paper_mlp: Option<f64>,
     /// The paper's capacity in kernels; `None` without a match.
-    pub paper_cnn: Option<f64>,
+    pub(crate) paper_cnn: Option<f64>,
 }
 
 impl TableRow {

@@ -37,37 +37,37 @@ use std::path::PathBuf;
 
 /// Options of a team's test.
 #[derive(Clone, Debug)]
-pub struct TeamOptions {
+pub(crate) struct TeamOptions {
     /// The run.json files.
-    pub archives: Vec<PathBuf>,
+    pub(crate) archives: Vec<PathBuf>,
     /// Their robots. Ids are looked up in all runs together; other selections apply to each run.
-    pub robots: Selection,
+    pub(crate) robots: Selection,
     /// Classes to tell apart; `None`: all of the dataset.
-    pub classes: Option<Vec<u8>>,
+    pub(crate) classes: Option<Vec<u8>>,
     /// Number of images.
-    pub images: HowMany,
+    pub(crate) images: HowMany,
     /// Split of the images.
-    pub split: HeldOut,
+    pub(crate) split: HeldOut,
     /// Seed for drawing images, and robots with `random:N`.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Path of the results (team.json; team.csv goes beside it).
-    pub out: PathBuf,
+    pub(crate) out: PathBuf,
 }
 
 /// Result of a team's test.
 #[derive(Clone, Debug)]
-pub struct TeamOutcome {
+pub(crate) struct TeamOutcome {
     /// The content of team.json.
-    pub file: TeamFile,
+    pub(crate) file: TeamFile,
     /// The error if the results could not be written, or only in part.
-    pub unwritten: Option<Error>,
+    pub(crate) unwritten: Option<Error>,
 }
 
 /// Tests a team on images. Writes the file after every robot; the same command goes on from there.
 ///
 /// # Errors
 /// Returns an error if robots do not fit the classes, or archive, data or selection is wrong.
-pub fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutcome, Error> {
+pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutcome, Error> {
     let archives = options.archives.iter();
     let sources = archives.map(|path| StoredRun::read(path)).collect::<Result<Vec<StoredRun>, Error>>()?;
     let Some(first) = sources.first() else {
@@ -215,7 +215,7 @@ fn classes(options: &TeamOptions, dataset: &Dataset) -> Result<Vec<u8>, Error> {
 }
 
 /// Returns the default file name of results on these images.
-pub fn own_name(split: HeldOut) -> &'static str {
+pub(crate) fn own_name(split: HeldOut) -> &'static str {
     match split {
         HeldOut::Test => TEAM_JSON,
         HeldOut::Validation => TEAM_VALIDATION_JSON,

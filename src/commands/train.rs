@@ -55,13 +55,13 @@ pub struct TrainOptions {
 #[derive(Clone, Debug)]
 pub struct TrainOutcome {
     /// The run as written to `run.json`.
-    pub run: RunFile,
+    pub(crate) run: RunFile,
     /// Total number of rollouts simulated, without validation.
-    pub rollouts: usize,
+    pub(crate) rollouts: usize,
     /// Height and width of the training images.
-    pub size: [usize; 2],
+    pub(crate) size: [usize; 2],
     /// Results on validation images; `None` if validation was stopped.
-    pub validated: Option<Vec<Validated>>,
+    pub(crate) validated: Option<Vec<Validated>>,
 }
 
 /// Trains a robot and validates it.

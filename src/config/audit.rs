@@ -12,22 +12,22 @@ use std::path::Path;
 #[serde(default, deny_unknown_fields)]
 pub struct Criteria {
     /// The walk up to which a robot gives no answer \[voxel lengths\]. Default 3, as in `eval`.
-    pub threshold: f64,
+    pub(crate) threshold: f64,
     /// The limit in a changed simulation \[voxel lengths\]. Lower than `threshold`, so that
     /// borderline walkers do not fail on a tiny change. Default 1.5.
-    pub least_walk: f64,
+    pub(crate) least_walk: f64,
     /// The least share of training images that a walker answers, correctly or not. Default 0.75.
-    pub least_answered: f64,
+    pub(crate) least_answered: f64,
     /// The least share of correct answers that a persistent rollout keeps. Default 0.9.
-    pub least_kept: f64,
+    pub(crate) least_kept: f64,
     /// The least share of the total walk under these images that it keeps. Default 0.5.
-    pub least_distance: f64,
+    pub(crate) least_distance: f64,
     /// The least share of rollouts in a changed world (stiffness, friction, gravity, pixels) that a
     /// robust robot keeps. If another change breaks a robust robot, it exploits what was changed;
     /// other robots are fragile. Default 0.75.
-    pub least_robust: f64,
+    pub(crate) least_robust: f64,
     /// The kinds and sizes of changes.
-    pub perturbations: Sizes,
+    pub(crate) perturbations: Sizes,
 }
 
 impl Default for Criteria {
@@ -49,7 +49,7 @@ impl Criteria {
     ///
     /// # Errors
     /// Returns an error, with file, line and key, if the criteria are invalid.
-    pub fn load(path: Option<&Path>, overrides: &[String]) -> Result<Self, Error> {
+    pub(crate) fn load(path: Option<&Path>, overrides: &[String]) -> Result<Self, Error> {
         reading::load(path, overrides, Criteria::check)
     }
 

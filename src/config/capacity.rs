@@ -18,25 +18,25 @@ const MOST_TRAININGS: usize = 100_000;
 #[serde(default, deny_unknown_fields)]
 pub struct CapacityConfig {
     /// The kinds of network.
-    pub networks: Vec<NetworkKind>,
+    pub(crate) networks: Vec<NetworkKind>,
     /// The smallest and the largest size.
     #[serde(deserialize_with = "pair::read")]
-    pub sizes: [usize; 2],
+    pub(crate) sizes: [usize; 2],
     /// The step from one size to the next.
-    pub step: usize,
+    pub(crate) step: usize,
     /// The number of trainings from scratch per size.
-    pub trainings: usize,
+    pub(crate) trainings: usize,
     /// True if training waits for an improvement on images of the training split, not on the test
     /// images as in the paper.
-    pub clean: bool,
+    pub(crate) clean: bool,
     /// The number of such images, evenly divided between the classes.
-    pub waiting_images: usize,
+    pub(crate) waiting_images: usize,
     /// The seed of the trainings.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// The training of networks with a hidden layer.
-    pub mlp: Hyperparameters,
+    pub(crate) mlp: Hyperparameters,
     /// The training of convolutional networks.
-    pub cnn: Hyperparameters,
+    pub(crate) cnn: Hyperparameters,
 }
 
 impl Default for CapacityConfig {
@@ -103,7 +103,7 @@ impl CapacityConfig {
     }
 
     /// Returns the hyperparameters of a kind of network.
-    pub fn of(&self, kind: NetworkKind) -> &Hyperparameters {
+    pub(crate) fn of(&self, kind: NetworkKind) -> &Hyperparameters {
         match kind {
             NetworkKind::Mlp => &self.mlp,
             NetworkKind::Cnn => &self.cnn,
@@ -111,7 +111,7 @@ impl CapacityConfig {
     }
 
     /// Returns the sizes to train.
-    pub fn sizes(&self) -> impl Iterator<Item = usize> {
+    pub(crate) fn sizes(&self) -> impl Iterator<Item = usize> {
         (self.sizes[0]..=self.sizes[1]).step_by(self.step)
     }
 }

@@ -16,12 +16,12 @@ pub(super) struct Mismatch {
     /// The kind of the value: "a list", or the same as `scalar`.
     found: String,
     /// The expected kind, with the number to write if a text is nearly one.
-    pub expected: String,
+    pub(crate) expected: String,
 }
 
 impl Mismatch {
     /// Formats the message with its key.
-    pub fn at(&self, key: &str) -> String {
+    pub(crate) fn at(&self, key: &str) -> String {
         let Mismatch { scalar, found, expected } = self;
         match scalar {
             Some(scalar) if !key.is_empty() => format!("{key} = {scalar}: expected {expected}"),

@@ -2,13 +2,13 @@
 
 pub mod audit;
 pub mod capacity;
-pub mod evaluation;
+pub(crate) mod evaluation;
 mod expected;
-pub mod pair;
-pub mod reading;
-pub mod task;
-pub mod train;
-pub mod validation;
+pub(crate) mod pair;
+pub(crate) mod reading;
+pub(crate) mod task;
+pub(crate) mod train;
+pub(crate) mod validation;
 
 use crate::base::error::Error;
 use crate::base::files::{home_expanded, read_given};
@@ -16,7 +16,7 @@ use crate::base::remedy::{Invocation, Remedy};
 use crate::body::MAX_SIDE;
 use crate::config::evaluation::EvaluationConfig;
 use crate::config::reading::Format;
-pub use crate::config::task::TaskConfig;
+pub(crate) use crate::config::task::TaskConfig;
 use crate::config::train::TrainConfig;
 use crate::config::validation::{LEAST, ValidationConfig};
 use crate::data::builtin::BuiltinDigits;
@@ -49,7 +49,7 @@ pub const BUILT_IN: [(&str, &str); 6] = [
 ];
 
 /// The largest whole number of a config, including seeds: TOML's are signed.
-pub const MAX_NUMBER: u64 = i64::MAX as u64;
+pub(crate) const MAX_NUMBER: u64 = i64::MAX as u64;
 
 /// The largest absolute offset of the QD score \[voxel lengths\].
 const MAX_OFFSET: f64 = 1e9;
@@ -107,7 +107,7 @@ pub struct Config {
 }
 
 /// Dotted keys with their values.
-pub type Settings = BTreeMap<String, toml::Value>;
+pub(crate) type Settings = BTreeMap<String, toml::Value>;
 
 /// Returns the keys in which two settings differ, with both values as text, in the keys' order.
 pub(crate) fn differing(there: &Settings, now: &Settings) -> Vec<(String, String, String)> {
@@ -149,7 +149,7 @@ pub struct BodyConfig {
     /// The number of columns. Default 14.
     pub width: usize,
     /// The minimum number of muscle voxels. Default 3.
-    pub min_muscles: usize,
+    pub(crate) min_muscles: usize,
 }
 
 impl Default for BodyConfig {
@@ -167,11 +167,11 @@ pub struct DataConfig {
     /// The folder of its files, if neither `--data` nor `MORPHCOG_DATA` gives one, nor the run
     /// where they were. Default `data/<dataset>`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub dir: Option<PathBuf>,
+    pub(crate) dir: Option<PathBuf>,
     /// True to swap rows and columns of the images in the files, for images that are stored
     /// mirrored and turned. Default: true for EMNIST, recognised by its names.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub transpose: Option<bool>,
+    pub(crate) transpose: Option<bool>,
     /// The training images by index, in the order of a sequential rollout.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub train_images: Option<Vec<usize>>,
@@ -180,7 +180,7 @@ pub struct DataConfig {
     pub images_per_class: usize,
     /// The built-in digits, for `dataset = "builtin"`.
     #[serde(default)]
-    pub builtin: BuiltinDigits,
+    pub(crate) builtin: BuiltinDigits,
 }
 
 impl DataConfig {
@@ -223,10 +223,10 @@ pub struct ArchiveConfig {
 #[serde(default, deny_unknown_fields)]
 pub struct CheckpointConfig {
     /// Generations between two checkpoints. Default 1000; larger values lose more at a power cut.
-    pub generations: u64,
+    pub(crate) generations: u64,
     /// Seconds between two checkpoints; longer if writing takes over a fiftieth of that. Default
     /// 10.
-    pub seconds: f64,
+    pub(crate) seconds: f64,
 }
 
 impl Default for CheckpointConfig {
@@ -364,7 +364,7 @@ impl Config {
     }
 
     /// Returns all classes of the task, in its order.
-    pub fn classes(&self) -> Vec<u8> {
+    pub(crate) fn classes(&self) -> Vec<u8> {
         self.task.classes()
     }
 
@@ -456,12 +456,12 @@ impl Config {
 
 impl Config {
     /// Returns true if fitness is the response of the bodies' probes to random images.
-    pub fn measures_response(&self) -> bool {
+    pub(crate) fn measures_response(&self) -> bool {
         self.evaluation.fitness == Fitness::Response
     }
 
     /// Returns what evolution maximises.
-    pub fn objective(&self) -> &'static dyn Objective {
+    pub(crate) fn objective(&self) -> &'static dyn Objective {
         match self.measures_response() {
             true => &GaitResponse,
             false => &Recognition,

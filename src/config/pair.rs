@@ -7,7 +7,7 @@ use serde::de::{Deserialize, Deserializer, Error};
 ///
 /// # Errors
 /// Returns an error if the list has another length, or an item is invalid.
-pub fn read<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<[T; 2], D::Error> {
+pub(crate) fn read<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<[T; 2], D::Error> {
     let items = Vec::<T>::deserialize(from)?;
     let count = items.len();
     items.try_into().map_err(|_| D::Error::custom(format!("expected a list of two, found {count}")))
@@ -17,7 +17,7 @@ pub fn read<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<[
 ///
 /// # Errors
 /// Returns the errors of [`read`].
-pub fn read_some<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
+pub(crate) fn read_some<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
     from: D,
 ) -> Result<Option<[T; 2]>, D::Error> {
     read(from).map(Some)

@@ -16,9 +16,9 @@ pub struct TaskConfig {
     /// All ways to split these classes into two groups; the task that a robot performs is a
     /// dimension of the archive.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub splits: Option<Vec<u8>>,
+    pub(crate) splits: Option<Vec<u8>>,
     /// With `splits`: one more bin for robots that always walk one way, as in the published code.
-    pub same_way_bin: bool,
+    pub(crate) same_way_bin: bool,
 }
 
 impl TaskConfig {
@@ -26,7 +26,7 @@ impl TaskConfig {
     ///
     /// # Errors
     /// Returns an error if the section `[task]` defines none.
-    pub fn grouping(&self) -> Result<Grouping, Error> {
+    pub(crate) fn grouping(&self) -> Result<Grouping, Error> {
         let TaskConfig { groups, splits, same_way_bin } = self;
         let grouping = match (groups, splits) {
             (Some([a, b]), None) if !same_way_bin => Grouping::two_groups(a, b),
@@ -43,7 +43,7 @@ impl TaskConfig {
     }
 
     /// Returns all classes of the task, in its order.
-    pub fn classes(&self) -> Vec<u8> {
+    pub(crate) fn classes(&self) -> Vec<u8> {
         let TaskConfig { groups, splits, .. } = self;
         groups.iter().flatten().chain(splits).flatten().copied().collect()
     }

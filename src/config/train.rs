@@ -13,10 +13,10 @@ pub struct TrainConfig {
     /// The training images of each class for the model; robots walk under only a few of them.
     /// Default 2000, or three quarters of the scarcest class if that is less: more make designs
     /// general, and cost little.
-    pub images_per_class: usize,
+    pub(crate) images_per_class: usize,
     /// The rollouts with random images that measure a gait's response. Default 300: with fewer than
     /// two for each soft voxel and sensor the slopes are mostly noise.
-    pub random_images: usize,
+    pub(crate) random_images: usize,
     /// The windows of the images tried for each gait, that of `stimulus.margin` first; the robot
     /// gets the one that the model finds best for the task. Default 0: only that of
     /// `stimulus.margin`. Values above 0 require the reduction "area". They cost no rollouts.
@@ -25,19 +25,19 @@ pub struct TrainConfig {
     /// The rounds in which the response is measured around the latest design, and the design
     /// problem is solved again. Default 6: more seldom help. With 0, the robot keeps its own soft
     /// voxels and sensors, and is only refined; of several robots, the fittest.
-    pub rounds: usize,
+    pub(crate) rounds: usize,
     /// The training images per round. Default 120: fewer make slopes noisier and the constant
     /// wrong.
-    pub images: usize,
+    pub(crate) images: usize,
     /// The training images on which designs and challengers compete: at least one of every class,
     /// the groups alternating. Default 400: with fewer, small gains look like chance.
-    pub final_images: usize,
+    pub(crate) final_images: usize,
     /// The bodies that challenge the best design, in sensors or in a few voxels of any material.
     /// Default 30; later ones win more seldom.
     pub challengers: usize,
     /// The conditions that alternate between images, so that designs do not depend on the first
     /// touch of the ground or exploit length limits.
-    pub perturbations: ByTurns,
+    pub(crate) perturbations: ByTurns,
 }
 
 impl Default for TrainConfig {

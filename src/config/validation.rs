@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The minimum number of validation images.
-pub const LEAST: usize = 40;
+pub(crate) const LEAST: usize = 40;
 
 /// The key of the number of images, for messages.
 pub(crate) const IMAGES_KEY: &str = "validation.images";
@@ -16,7 +16,7 @@ pub struct ValidationConfig {
     /// The number of images, evenly divided between the classes; never trained on. Default 400.
     pub images: usize,
     /// The number of robots per task that they choose at the run's end. Default 0: no validation.
-    pub best: usize,
+    pub(crate) best: usize,
 }
 
 impl Default for ValidationConfig {

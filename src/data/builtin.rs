@@ -16,15 +16,15 @@ pub const BUILTIN: &str = "builtin";
 /// `classes[i % k]`, so that indices 0, 1, …, k − 1 are one image of each class.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct BuiltinDigits {
+pub(crate) struct BuiltinDigits {
     /// Seed of the images.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// The digits (0 … 9) in the order in which they take turns.
-    pub classes: Vec<u8>,
+    pub(crate) classes: Vec<u8>,
     /// Number of training images of each class.
-    pub train_per_class: usize,
+    pub(crate) train_per_class: usize,
     /// Number of test images of each class.
-    pub test_per_class: usize,
+    pub(crate) test_per_class: usize,
 }
 
 impl Default for BuiltinDigits {
@@ -56,13 +56,13 @@ pub enum BuiltinError {
 
 impl BuiltinDigits {
     /// Number of rows and of columns of every image.
-    pub const SIDE: usize = pen::SIDE;
+    pub(crate) const SIDE: usize = pen::SIDE;
 
     /// Checks for at least one class, different digits, and not too many images of each.
     ///
     /// # Errors
     /// Returns a [`BuiltinError`] otherwise.
-    pub fn check(&self) -> Result<(), BuiltinError> {
+    pub(crate) fn check(&self) -> Result<(), BuiltinError> {
         if self.classes.is_empty() {
             return Err(BuiltinError::NoClasses);
         }
@@ -82,22 +82,17 @@ impl BuiltinDigits {
     }
 
     /// Returns the number of images of a split.
-    pub fn len(&self, split: Split) -> usize {
+    pub(crate) fn len(&self, split: Split) -> usize {
         self.classes.len() * self.per_class(split)
     }
 
-    /// Returns true if a split has no image.
-    pub fn is_empty(&self, split: Split) -> bool {
-        self.len(split) == 0
-    }
-
     /// Returns the digit at an index of a split; `None` beyond its end.
-    pub fn label(&self, split: Split, index: usize) -> Option<u8> {
+    pub(crate) fn label(&self, split: Split, index: usize) -> Option<u8> {
         (index < self.len(split)).then(|| self.classes[index % self.classes.len()])
     }
 
     /// Draws the image at an index of a split, 28 × 28, 0 paper, 255 ink; `None` beyond its end.
-    pub fn image(&self, split: Split, index: usize) -> Option<Grid<u8>> {
+    pub(crate) fn image(&self, split: Split, index: usize) -> Option<Grid<u8>> {
         let class = self.label(split, index)?;
         let number = (index / self.classes.len()) as u64;
         let page = 16 * split.code() + u64::from(class);
@@ -105,7 +100,7 @@ impl BuiltinDigits {
     }
 
     /// Returns the SHA-256 of a split's parameters: drawing version, seed, classes and number.
-    pub fn fingerprint(&self, split: Split) -> String {
+    pub(crate) fn fingerprint(&self, split: Split) -> String {
         let (seed, classes, number) = (self.seed, &self.classes, self.per_class(split));
         let drawing = pen::DRAWING;
         let text =

@@ -2,7 +2,7 @@
 
 use crate::data::info::FileInfo;
 /// Datasets that `morphcog data fetch` can download.
-pub const FETCHABLE: [&str; 2] = ["mnist", "fashion-mnist"];
+pub(crate) const FETCHABLE: [&str; 2] = ["mnist", "fashion-mnist"];
 
 /// A file to download, as published.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -33,7 +33,7 @@ pub struct Catalogue {
 #[error("\"{name}\" cannot be fetched; expected {}", FETCHABLE.join(" or "))]
 pub struct UnknownDataset {
     /// The name.
-    pub name: String,
+    pub(crate) name: String,
 }
 
 /// Name, size and SHA-256 of a dataset's training images and labels, test images and labels.
@@ -68,7 +68,7 @@ const MNIST_UNPACKED: [&str; 4] = [
 
 /// SHA-256 of the content of MNIST's training and test split, however it is packed (see
 /// [`Split::fingerprint`](crate::data::info::Split::fingerprint)).
-pub const MNIST_CONTENT: [&str; 2] = [
+pub(crate) const MNIST_CONTENT: [&str; 2] = [
     "c5097fdd51cfdbe7695fd9df3612695696864b5c424f58d843ffdc5d335e9914",
     "18489308deedfe2f7bd3a11e599a597126f161d991b1ffcffb71642aa76f7f62",
 ];
@@ -128,7 +128,7 @@ impl Catalogue {
 
 /// Recognises the dataset of a split by its fingerprint and files, whatever name it was found
 /// under: MNIST by its content, Fashion-MNIST by its files as published.
-pub fn known_as(fingerprint: &str, files: &[FileInfo]) -> Option<&'static str> {
+pub(crate) fn known_as(fingerprint: &str, files: &[FileInfo]) -> Option<&'static str> {
     let are_published = |published: &Published| {
         let is_one = |file: &FileInfo| published.iter().any(|(_, _, sha256)| *sha256 == file.sha256);
         files.len() == 2 && files.iter().all(is_one)

@@ -121,7 +121,7 @@ impl Dataset {
     ///
     /// # Errors
     /// As [`Dataset::load`].
-    pub fn oriented(
+    pub(crate) fn oriented(
         name: &str,
         given: &[DatasetPlace],
         wanted: &[Split],
@@ -151,7 +151,7 @@ impl Dataset {
     ///
     /// # Errors
     /// Returns [`DatasetError::Builtin`] if [`BuiltinDigits::check`] fails.
-    pub fn builtin(digits: BuiltinDigits, wanted: &[Split]) -> Result<Self, DatasetError> {
+    pub(crate) fn builtin(digits: BuiltinDigits, wanted: &[Split]) -> Result<Self, DatasetError> {
         digits.check()?;
         let loaded = |&split: &Split| {
             let labels = (0..).map_while(|i| digits.label(split, i)).collect();
@@ -162,17 +162,17 @@ impl Dataset {
     }
 
     /// Returns the name of the dataset.
-    pub fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         &self.name
     }
 
     /// Returns the folder it was read from; none for the built-in digits.
-    pub fn folder(&self) -> Option<&Path> {
+    pub(crate) fn folder(&self) -> Option<&Path> {
         self.folder.as_deref()
     }
 
     /// Returns name, folder and the origin of that folder, for messages.
-    pub fn place(&self) -> String {
+    pub(crate) fn place(&self) -> String {
         match &self.folder {
             Some(folder) => format!("{} in {} ({})", self.name, folder.display(), self.origin),
             None => self.name.clone(),
@@ -180,7 +180,7 @@ impl Dataset {
     }
 
     /// Returns height and width of the images of a split; `None` if it was not loaded.
-    pub fn size(&self, split: Split) -> Option<[usize; 2]> {
+    pub(crate) fn size(&self, split: Split) -> Option<[usize; 2]> {
         self.splits.get(&split).map(|loaded| match &loaded.images {
             Images::Stored(stored) => [stored.images.height, stored.images.width],
             Images::Drawn(_) => [BuiltinDigits::SIDE; 2],
@@ -188,7 +188,7 @@ impl Dataset {
     }
 
     /// Returns true if rows and columns of the images in its files are exchanged.
-    pub fn is_transposed(&self) -> bool {
+    pub(crate) fn is_transposed(&self) -> bool {
         let is_turned =
             |loaded: &Loaded| matches!(&loaded.images, Images::Stored(stored) if stored.transposed);
         self.splits.values().any(is_turned)
@@ -197,11 +197,6 @@ impl Dataset {
     /// Returns the number of images in a split; 0 if it was not loaded.
     pub fn len(&self, split: Split) -> usize {
         self.splits.get(&split).map_or(0, |loaded| loaded.labels.len())
-    }
-
-    /// Returns true if a split has no images or was not loaded.
-    pub fn is_empty(&self, split: Split) -> bool {
-        self.len(split) == 0
     }
 
     /// Returns the image at an index of a split: 0 background … 255 ink, row 0 on top.
@@ -231,12 +226,12 @@ impl Dataset {
     }
 
     /// Returns the classes that occur in a split, ascending; none if it was not loaded.
-    pub fn classes(&self, split: Split) -> Vec<u8> {
+    pub(crate) fn classes(&self, split: Split) -> Vec<u8> {
         self.splits.get(&split).map_or_else(Vec::new, |loaded| loaded.by_class.keys().copied().collect())
     }
 
     /// Returns a split's SHA-256 (see [`SplitInfo::fingerprint`]); `None` if it was not loaded.
-    pub fn fingerprint(&self, split: Split) -> Option<String> {
+    pub(crate) fn fingerprint(&self, split: Split) -> Option<String> {
         self.splits.get(&split).map(|loaded| match &loaded.images {
             Images::Stored(stored) => stored.fingerprint.clone(),
             Images::Drawn(digits) => digits.fingerprint(split),
@@ -244,7 +239,7 @@ impl Dataset {
     }
 
     /// Returns the description of the dataset for a run's record.
-    pub fn info(&self) -> DatasetInfo {
+    pub(crate) fn info(&self) -> DatasetInfo {
         let describe = |(&split, loaded): (&Split, &Loaded)| {
             let [height, width] = self.size(split).expect("the split is loaded");
             let (transposed, files) = match &loaded.images {
@@ -267,7 +262,7 @@ impl Dataset {
     ///
     /// # Errors
     /// Returns [`DatasetError::NotLoaded`], or [`DatasetError::TooFew`] if images are too few.
-    pub fn draw(
+    pub(crate) fn draw(
         &self,
         split: Split,
         classes: &[u8],

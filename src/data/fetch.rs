@@ -42,7 +42,7 @@ impl Program {
     pub const ALL: [Program; 2] = [Program::Curl, Program::Wget];
 
     /// Returns its name as a command.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Program::Curl => "curl",
             Program::Wget => "wget",
@@ -124,7 +124,7 @@ pub enum AttemptError {
 #[derive(Debug)]
 pub struct Attempt {
     /// The address tried.
-    pub url: String,
+    pub(crate) url: String,
     /// The error.
     pub error: AttemptError,
 }
@@ -227,7 +227,7 @@ pub enum FetchOutcome {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fetched {
     /// The file.
-    pub file: PathBuf,
+    pub(crate) file: PathBuf,
     /// Its origin.
     pub outcome: FetchOutcome,
 }

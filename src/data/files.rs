@@ -24,10 +24,10 @@ pub(crate) fn published_size(name: &str) -> Option<[usize; 2]> {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DatasetPlace {
     /// Origin of the folder in the user's terms: "as given", "MORPHCOG_DATA", `[data] dir`.
-    pub origin: String,
+    pub(crate) origin: String,
     /// The folder. If it has a subfolder with the dataset's name, that is used, so one folder can
     /// hold several datasets.
-    pub path: PathBuf,
+    pub(crate) path: PathBuf,
 }
 
 impl fmt::Display for DatasetPlace {
@@ -61,7 +61,7 @@ pub fn places(
 
 /// Returns the folder of a dataset if no place is given, which is also the target of downloads:
 /// `data/<name>`.
-pub fn default_folder(name: &str) -> PathBuf {
+pub(crate) fn default_folder(name: &str) -> PathBuf {
     Path::new("data").join(name)
 }
 
@@ -150,7 +150,7 @@ pub enum FilesError {
 
 impl FilesError {
     /// Returns the user's alternatives.
-    pub fn remedies(&self) -> &[Remedy] {
+    pub(crate) fn remedies(&self) -> &[Remedy] {
         match self {
             FilesError::Name(_) => &[Remedy::NameData],
             FilesError::Folder { remedies, .. }
@@ -165,18 +165,18 @@ impl FilesError {
 /// The images of one split and their origin.
 #[derive(Clone, Debug)]
 pub(crate) struct StoredSplit {
-    pub images: IdxImages,
+    pub(crate) images: IdxImages,
     /// True if their rows and columns are exchanged in the files.
-    pub transposed: bool,
-    pub files: Vec<FileInfo>,
-    pub fingerprint: String,
+    pub(crate) transposed: bool,
+    pub(crate) files: Vec<FileInfo>,
+    pub(crate) fingerprint: String,
 }
 
 /// Checks that a name can be a dataset's: it must be a folder's.
 ///
 /// # Errors
 /// Returns [`FilesError::Name`] otherwise.
-pub fn check_name(name: &str) -> Result<(), FilesError> {
+pub(crate) fn check_name(name: &str) -> Result<(), FilesError> {
     let allowed = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
     match name.is_empty() || name.starts_with('.') || !name.chars().all(allowed) {
         true => Err(FilesError::Name(name.to_string())),

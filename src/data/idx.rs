@@ -14,27 +14,27 @@ use std::path::{Path, PathBuf};
 
 /// Most bytes of one file, stored or unpacked. A larger file is not a set of images but has a
 /// broken header or is the wrong file. (MNIST: 47 MB; the whole of EMNIST: 0.6 GB.)
-pub const MAX_BYTES: u64 = 1 << 30;
+pub(crate) const MAX_BYTES: u64 = 1 << 30;
 
 /// Type code of unsigned bytes in a magic number.
 const UNSIGNED_BYTE: u8 = 0x08;
 
 /// Images of one IDX3 file, all of the same size.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct IdxImages {
+pub(crate) struct IdxImages {
     /// Number of images, at least 1.
-    pub count: usize,
+    pub(crate) count: usize,
     /// Rows per image, at least 1.
-    pub height: usize,
+    pub(crate) height: usize,
     /// Columns per image, at least 1.
-    pub width: usize,
+    pub(crate) width: usize,
     /// All count × height × width pixels (0 … 255), image after image, row-major from the top left.
-    pub pixels: Vec<u8>,
+    pub(crate) pixels: Vec<u8>,
 }
 
 impl IdxImages {
     /// Returns one image; `None` beyond the last.
-    pub fn image(&self, index: usize) -> Option<Grid<u8>> {
+    pub(crate) fn image(&self, index: usize) -> Option<Grid<u8>> {
         let first = index.checked_mul(self.height)?;
         let rows = self.pixels.chunks(self.width).skip(first).take(self.height);
         Grid::from_rows(rows.map(<[u8]>::to_vec).collect()).ok()
@@ -42,7 +42,7 @@ impl IdxImages {
 
     /// Exchanges rows and columns of all images.
     #[must_use]
-    pub fn transposed(mut self) -> Self {
+    pub(crate) fn transposed(mut self) -> Self {
         let (height, width) = (self.height, self.width);
         let mut image = Vec::with_capacity(height.saturating_mul(width).min(self.pixels.len()));
         for pixels in self.pixels.chunks_exact_mut(height * width) {
@@ -56,13 +56,13 @@ impl IdxImages {
 
 /// The content of a file, and the bytes on disk that it came from.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct IdxFile<T> {
+pub(crate) struct IdxFile<T> {
     /// The decoded content.
-    pub content: T,
+    pub(crate) content: T,
     /// Size of the stored file (compressed, if it is), bytes.
-    pub bytes: u64,
+    pub(crate) bytes: u64,
     /// SHA-256 of the stored file, in hexadecimal.
-    pub sha256: String,
+    pub(crate) sha256: String,
 }
 
 /// The reason why a file is not the expected IDX file. Every message names the file.
@@ -189,7 +189,7 @@ pub enum IdxError {
 
 impl IdxError {
     /// Returns true if the file could not be opened or read; false if it has the wrong content.
-    pub fn is_io(&self) -> bool {
+    pub(crate) fn is_io(&self) -> bool {
         matches!(self, IdxError::Io { .. })
     }
 }
@@ -198,7 +198,7 @@ impl IdxError {
 ///
 /// # Errors
 /// Returns an [`IdxError`] if the file cannot be read or is anything but exactly such a file.
-pub fn read_images(file: &Path) -> Result<IdxFile<IdxImages>, IdxError> {
+pub(crate) fn read_images(file: &Path) -> Result<IdxFile<IdxImages>, IdxError> {
     let stored = read_file(file)?;
     let (sizes, pixels) = decode::<3>(file, &stored, "images", "count, rows, columns")?;
     let [count, height, width] = sizes;
@@ -209,14 +209,14 @@ pub fn read_images(file: &Path) -> Result<IdxFile<IdxImages>, IdxError> {
 ///
 /// # Errors
 /// Returns an [`IdxError`] if the file cannot be read or is anything but exactly such a file.
-pub fn read_labels(file: &Path) -> Result<IdxFile<Vec<u8>>, IdxError> {
+pub(crate) fn read_labels(file: &Path) -> Result<IdxFile<Vec<u8>>, IdxError> {
     let stored = read_file(file)?;
     let (_, labels) = decode::<1>(file, &stored, "labels", "count")?;
     Ok(with_origin(&stored, labels))
 }
 
 /// Returns the header of unsigned bytes with these sizes: magic number and big-endian lengths.
-pub fn header(sizes: &[u32]) -> Vec<u8> {
+pub(crate) fn header(sizes: &[u32]) -> Vec<u8> {
     let mut bytes = vec![0, 0, UNSIGNED_BYTE, sizes.len() as u8];
     bytes.extend(sizes.iter().flat_map(|size| size.to_be_bytes()));
     bytes

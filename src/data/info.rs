@@ -6,21 +6,21 @@ use std::fmt;
 
 /// A run's record of its dataset.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct DatasetInfo {
+pub(crate) struct DatasetInfo {
     /// Name: "mnist", "fashion-mnist", "builtin" or the user's own.
-    pub name: String,
+    pub(crate) name: String,
     /// The folder it was read from, or "builtin".
-    pub source: String,
+    pub(crate) source: String,
     /// Origin of that folder ("as given", "MORPHCOG_DATA", `[data] dir`, "default"), or "builtin".
-    pub origin: String,
+    pub(crate) origin: String,
     /// The splits that were loaded.
-    pub splits: BTreeMap<Split, SplitInfo>,
+    pub(crate) splits: BTreeMap<Split, SplitInfo>,
 }
 
 impl DatasetInfo {
     /// Lists unintended differences between training and test images: sizes, and classes in one
     /// only.
-    pub fn differences(&self) -> Vec<String> {
+    pub(crate) fn differences(&self) -> Vec<String> {
         let [Some(train), Some(test)] = Split::ALL.map(|split| self.splits.get(&split)) else {
             return Vec::new();
         };
@@ -44,35 +44,35 @@ impl DatasetInfo {
 
 /// A run's record of one split.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct SplitInfo {
+pub(crate) struct SplitInfo {
     /// Number of images.
-    pub images: usize,
+    pub(crate) images: usize,
     /// Rows per image.
-    pub height: usize,
+    pub(crate) height: usize,
     /// Columns per image.
-    pub width: usize,
+    pub(crate) width: usize,
     /// SHA-256 of the content. For files: of the unpacked image file followed by the unpacked label
     /// file (whether or not they are gzipped), with the images transposed if they are. For built-in
     /// digits: of their parameters.
-    pub fingerprint: String,
+    pub(crate) fingerprint: String,
     /// True if rows and columns of the images are exchanged in the files.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub transposed: bool,
+    pub(crate) transposed: bool,
     /// Number of images of every class that occurs.
-    pub per_class: BTreeMap<u8, usize>,
+    pub(crate) per_class: BTreeMap<u8, usize>,
     /// The files as found, images first; none for built-in digits.
-    pub files: Vec<FileInfo>,
+    pub(crate) files: Vec<FileInfo>,
 }
 
 /// A file as found on disk.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct FileInfo {
+pub(crate) struct FileInfo {
     /// Name within [`DatasetInfo::source`].
-    pub name: String,
+    pub(crate) name: String,
     /// Size, bytes.
-    pub bytes: u64,
+    pub(crate) bytes: u64,
     /// SHA-256 of the file as found (compressed, if it is).
-    pub sha256: String,
+    pub(crate) sha256: String,
 }
 
 /// One of the two parts of a dataset.

@@ -1,11 +1,11 @@
 //! Images: the IDX reader, places and sources of datasets, and the digits that the program draws.
 
-pub mod builtin;
+pub(crate) mod builtin;
 pub mod catalogue;
 pub mod dataset;
 pub mod fetch;
 pub mod files;
-pub mod idx;
-pub mod info;
-pub mod pen;
-pub mod strokes;
+pub(crate) mod idx;
+pub(crate) mod info;
+pub(crate) mod pen;
+pub(crate) mod strokes;

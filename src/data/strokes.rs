@@ -18,9 +18,9 @@ use Place::{Turn, Via};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Variant {
     /// Relative weight among the variants of its digit.
-    pub weight: u32,
+    pub(crate) weight: u32,
     /// The strokes.
-    pub strokes: &'static [&'static [Place]],
+    pub(crate) strokes: &'static [&'static [Place]],
 }
 
 const fn variant(weight: u32, strokes: &'static [&'static [Place]]) -> Variant {

@@ -5,63 +5,63 @@ use crate::body::Material;
 
 /// A colour with opacity, 8 bits each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Colour {
+pub(crate) struct Colour {
     /// Red, green, blue (sRGB).
-    pub rgb: [u8; 3],
+    pub(crate) rgb: [u8; 3],
     /// 0 (transparent) … 255 (opaque).
-    pub opacity: u8,
+    pub(crate) opacity: u8,
 }
 
 impl Colour {
     /// Creates an opaque colour.
-    pub const fn new(red: u8, green: u8, blue: u8) -> Self {
+    pub(crate) const fn new(red: u8, green: u8, blue: u8) -> Self {
         Colour { rgb: [red, green, blue], opacity: 255 }
     }
 
     /// Returns this colour with another opacity.
-    pub const fn with_opacity(self, opacity: u8) -> Self {
+    pub(crate) const fn with_opacity(self, opacity: u8) -> Self {
         Colour { rgb: self.rgb, opacity }
     }
 
     /// Returns the colour without its opacity, as `#rrggbb`.
-    pub fn hex(self) -> String {
+    pub(crate) fn hex(self) -> String {
         let [red, green, blue] = self.rgb;
         format!("#{red:02x}{green:02x}{blue:02x}")
     }
 
     /// Returns the gray of an intensity in [0, 1].
-    pub fn gray(intensity: f64) -> Self {
+    pub(crate) fn gray(intensity: f64) -> Self {
         let level = (255.0 * intensity.clamp(0.0, 1.0)).round() as u8;
         Colour::new(level, level, level)
     }
 }
 
 /// The sky behind the robot, and the paper behind text.
-pub const PAPER: Colour = Colour::new(255, 255, 255);
+pub(crate) const PAPER: Colour = Colour::new(255, 255, 255);
 /// The colour of text and axes.
-pub const INK: Colour = Colour::new(34, 36, 40);
+pub(crate) const INK: Colour = Colour::new(34, 36, 40);
 /// The colour of secondary text.
-pub const FAINT: Colour = Colour::new(112, 116, 124);
+pub(crate) const FAINT: Colour = Colour::new(112, 116, 124);
 /// The ground.
-pub const GROUND: Colour = Colour::new(236, 233, 226);
+pub(crate) const GROUND: Colour = Colour::new(236, 233, 226);
 /// The lines on the ground.
-pub const GROUND_LINE: Colour = Colour::new(120, 112, 98);
+pub(crate) const GROUND_LINE: Colour = Colour::new(120, 112, 98);
 /// The lines between the columns and rows of the world, in the paper's look.
-pub const GRID: Colour = Colour::new(228, 231, 236);
+pub(crate) const GRID: Colour = Colour::new(228, 231, 236);
 /// The ground's voxels, in the paper's look.
-pub const PEG: Colour = Colour::new(72, 74, 80);
+pub(crate) const PEG: Colour = Colour::new(72, 74, 80);
 /// The path of the centre of mass.
-pub const TRACE: Colour = Colour::new(178, 24, 158);
+pub(crate) const TRACE: Colour = Colour::new(178, 24, 158);
 /// The lines between voxels where they are opaque.
-pub const SEAM: Colour = Colour::new(226, 228, 232);
+pub(crate) const SEAM: Colour = Colour::new(226, 228, 232);
 /// The colour of warnings.
-pub const ALARM: Colour = Colour::new(190, 20, 40);
+pub(crate) const ALARM: Colour = Colour::new(190, 20, 40);
 
 /// Areas (square voxel lengths) at which a voxel has the first, middle and last of its [`tones`].
-pub const TONE_AREAS: [f64; 3] = [0.5, 1.0, 1.6];
+pub(crate) const TONE_AREAS: [f64; 3] = [0.5, 1.0, 1.6];
 
 /// Returns a material's colours when small, at rest and large.
-pub fn tones(material: Material) -> [[u8; 3]; 3] {
+pub(crate) fn tones(material: Material) -> [[u8; 3]; 3] {
     match material {
         Material::Empty => [[255, 255, 255]; 3],
         Material::Rigid => [[6, 6, 8], [42, 43, 47], [78, 80, 85]],
@@ -76,7 +76,7 @@ pub fn tones(material: Material) -> [[u8; 3]; 3] {
 /// Returns the lines that mark a material on large voxels, from −½ to ½, x to the right, y up:
 /// chevrons up and down for muscles, plus and minus for sensors. Colours alone cannot keep six
 /// materials apart at every shade for colour-blind viewers.
-pub fn mark(material: Material) -> &'static [&'static [[f64; 2]]] {
+pub(crate) fn mark(material: Material) -> &'static [&'static [[f64; 2]]] {
     match material {
         Material::Empty | Material::Rigid | Material::Soft => &[],
         Material::MuscleInPhase => &[&[[-0.2, -0.1], [0.0, 0.12], [0.2, -0.1]]],
@@ -87,14 +87,14 @@ pub fn mark(material: Material) -> &'static [&'static [[f64; 2]]] {
 }
 
 /// The width of a mark, in voxel lengths.
-pub const MARK_EXTENT: f64 = 0.4;
+pub(crate) const MARK_EXTENT: f64 = 0.4;
 
 /// The width of a mark's lines, in voxel lengths.
-pub const MARK_WIDTH: f64 = 0.09;
+pub(crate) const MARK_WIDTH: f64 = 0.09;
 
 /// Returns the colour of a material's mark on a voxel of colour `on`: a dark tone of the material
 /// on light voxels, a light tone on dark ones.
-pub fn mark_colour(material: Material, on: Colour) -> Colour {
+pub(crate) fn mark_colour(material: Material, on: Colour) -> Colour {
     let [[r, g, b], _, [red, green, blue]] = tones(material);
     let [on_red, on_green, on_blue] = on.rgb.map(f64::from);
     match 0.2126 * on_red + 0.7152 * on_green + 0.0722 * on_blue > 105.0 {
@@ -105,7 +105,7 @@ pub fn mark_colour(material: Material, on: Colour) -> Colour {
 
 /// Maps a point of a mark into a voxel whose corners are given clockwise from the top left. The
 /// corners decide whether y runs up or down.
-pub fn placed([x, y]: [f64; 2], [a, b, c, d]: [[f64; 2]; 4]) -> [f64; 2] {
+pub(crate) fn placed([x, y]: [f64; 2], [a, b, c, d]: [[f64; 2]; 4]) -> [f64; 2] {
     [0, 1].map(|k| {
         let (left, right) = ((a[k] + d[k]) / 2.0, (b[k] + c[k]) / 2.0);
         let (upper, lower) = ((a[k] + b[k]) / 2.0, (c[k] + d[k]) / 2.0);
@@ -114,7 +114,7 @@ pub fn placed([x, y]: [f64; 2], [a, b, c, d]: [[f64; 2]; 4]) -> [f64; 2] {
 }
 
 /// Returns a voxel's colour: its material's, darker the smaller its area (square voxel lengths).
-pub fn shade(material: Material, area: f64) -> Colour {
+pub(crate) fn shade(material: Material, area: f64) -> Colour {
     let [small, rest, large] = tones(material);
     let [low, middle, high] = TONE_AREAS;
     let (from, to, t) = if area < middle {

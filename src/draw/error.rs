@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 /// The widths that a picture can have, pixels.
-pub const WIDTHS: RangeInclusive<u32> = 320..=4096;
+pub(crate) const WIDTHS: RangeInclusive<u32> = 320..=4096;
 
 /// A reason why a picture cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -67,7 +67,7 @@ impl From<PictureError> for Error {
 ///
 /// # Errors
 /// [`PictureError::Write`] with the path.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), PictureError> {
+pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), PictureError> {
     crate::base::files::write_atomically(path, bytes)
         .map_err(|source| PictureError::Write { path: path.to_path_buf(), source })
 }

@@ -11,7 +11,7 @@ const REGULAR: &[u8] = include_bytes!("assets/DejaVuSansCondensed-subset.ttf");
 const BOLD: &[u8] = include_bytes!("assets/DejaVuSansCondensed-Bold-subset.ttf");
 
 /// The font families that the SVG of figures lists.
-pub const FAMILIES: &str = "'DejaVu Sans Condensed', Arial, Helvetica, 'Liberation Sans', sans-serif";
+pub(crate) const FAMILIES: &str = "'DejaVu Sans Condensed', Arial, Helvetica, 'Liberation Sans', sans-serif";
 
 fn font(bold: bool) -> &'static Face<'static> {
     static FONTS: LazyLock<[Face; 2]> = LazyLock::new(|| {
@@ -32,7 +32,7 @@ fn advance(font: &Face, glyph: GlyphId) -> u16 {
 }
 
 /// Returns the width of an unkerned text, points, at a font size; every family of figures fits it.
-pub fn width(text: &str, size: f64, bold: bool) -> f64 {
+pub(crate) fn width(text: &str, size: f64, bold: bool) -> f64 {
     let font = font(bold);
     let units: u64 = text.chars().map(|letter| u64::from(advance(font, glyph(font, letter)))).sum();
     // Font engines round sizes to 64ths.
@@ -40,7 +40,7 @@ pub fn width(text: &str, size: f64, bold: bool) -> f64 {
 }
 
 /// Returns the kerned outlines of a text from the origin, y down, and its width. Blanks have none.
-pub fn letters(text: &str, size: f64, bold: bool) -> (Option<Path>, f32) {
+pub(crate) fn letters(text: &str, size: f64, bold: bool) -> (Option<Path>, f32) {
     let font = font(bold);
     let scale = size as f32 / f32::from(font.units_per_em());
     let mut outlines = Outlines { path: PathBuilder::new(), scale, x: 0.0 };
@@ -110,7 +110,7 @@ impl OutlineBuilder for Outlines {
 }
 
 /// Returns a text no wider than `most` points, cut with an ellipsis if necessary.
-pub fn fitted(text: &str, size: f64, bold: bool, most: f64) -> String {
+pub(crate) fn fitted(text: &str, size: f64, bold: bool, most: f64) -> String {
     if width(text, size, bold) <= most {
         return text.to_string();
     }
@@ -126,7 +126,7 @@ pub fn fitted(text: &str, size: f64, bold: bool, most: f64) -> String {
 
 /// Breaks a text at blanks into at most `count` lines, none wider than `most` points. Text that
 /// does not fit even so is cut.
-pub fn lines(text: &str, size: f64, bold: bool, most: f64, count: usize) -> Vec<String> {
+pub(crate) fn lines(text: &str, size: f64, bold: bool, most: f64, count: usize) -> Vec<String> {
     let mut lines = Vec::new();
     let mut rest = text;
     while lines.len() + 1 < count && width(rest, size, bold) > most {

@@ -16,18 +16,18 @@ use std::path::Path;
 
 /// Options of an animation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GifOptions {
+pub(crate) struct GifOptions {
     /// Width in pixels ([`stage::WIDTHS`](crate::draw::stage::WIDTHS)); the body gives the height.
-    pub width: u32,
+    pub(crate) width: u32,
     /// Frames per second, at most 50 (GIFs count hundredths of a second; viewers slow faster ones).
-    pub fps: f64,
+    pub(crate) fps: f64,
     /// The control steps from one frame to the next, at least 1. A second of the robot's time has
     /// 50 control steps, so 1 at 50 frames per second is real time.
-    pub every: usize,
+    pub(crate) every: usize,
     /// The look of the world.
-    pub look: Look,
+    pub(crate) look: Look,
     /// The seconds for which the last frame of each phase stays.
-    pub hold: f64,
+    pub(crate) hold: f64,
 }
 
 impl Default for GifOptions {
@@ -48,12 +48,12 @@ const BATCH: usize = 32;
 /// # Errors
 /// Returns a [`PictureError`] if the recording cannot be drawn, the width is not possible or the
 /// file cannot be written.
-pub fn write(path: &Path, recording: &Recording, options: &GifOptions) -> Result<(), PictureError> {
+pub(crate) fn write(path: &Path, recording: &Recording, options: &GifOptions) -> Result<(), PictureError> {
     write_whole(path, &encode(recording, options)?)
 }
 
 /// Returns the frames to draw: every `every`-th of each phase, and each phase's last.
-pub fn shown(walk: &Walk, every: usize) -> Vec<usize> {
+pub(crate) fn shown(walk: &Walk, every: usize) -> Vec<usize> {
     let mut frames = Vec::new();
     for phase in 0..walk.recording().phases.len() {
         let range = walk.phase_frames(phase);
@@ -68,7 +68,7 @@ pub fn shown(walk: &Walk, every: usize) -> Vec<usize> {
 ///
 /// # Errors
 /// Returns the errors of [`write()`], except those of the file.
-pub fn encode(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, PictureError> {
+pub(crate) fn encode(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, PictureError> {
     in_pool(|| encoded(recording, options))?
 }
 

@@ -36,7 +36,7 @@ const MOST_BYTES: usize = 5_500_000;
 ///
 /// # Errors
 /// Returns a [`PictureError`] if the recording cannot be drawn or the file cannot be written.
-pub fn write(
+pub(crate) fn write(
     path: &Path,
     recording: &Recording,
     title: &str,

@@ -5,23 +5,20 @@
 //! primitives, and `raster` paints them. The animated GIF and the self-contained HTML page build on
 //! these. Figures for print are vectors, in [`plot`]; `serve` has its own page, over HTTP.
 
-pub mod colour;
-pub mod error;
-pub mod fonts;
+pub(crate) mod colour;
+pub(crate) mod error;
+pub(crate) mod fonts;
 pub mod gif;
 pub mod html;
-pub mod palette;
-pub mod panel;
+pub(crate) mod palette;
+pub(crate) mod panel;
 pub mod plot;
-pub mod raster;
-pub mod report;
-pub mod scene;
-pub mod sheet;
-pub mod stage;
+pub(crate) mod raster;
+pub(crate) mod report;
+pub(crate) mod scene;
+pub(crate) mod sheet;
+pub(crate) mod stage;
 pub mod walk;
-
-pub use stage::Stage;
-pub use walk::Walk;
 
 /// Simulates a body (text form) for tests, under `phases` images, alternately dark and bright, for
 /// `steps` control steps each.

@@ -9,7 +9,7 @@ const NEAR: i32 = 18;
 
 /// Up to 255 colours, with the nearest one to any colour.
 #[derive(Clone, Debug)]
-pub struct Palette {
+pub(crate) struct Palette {
     colours: Vec<[u8; 3]>,
     /// The index of the nearest colour, by the upper six bits of red, green and blue.
     nearest: Vec<u8>,
@@ -18,7 +18,7 @@ pub struct Palette {
 impl Palette {
     /// Creates a palette from the `fixed` colours and then the most frequent colours of the samples
     /// (RGBA bytes), except those near a colour already in it.
-    pub fn new<'a>(fixed: &[[u8; 3]], samples: impl IntoIterator<Item = &'a [u8]>) -> Self {
+    pub(crate) fn new<'a>(fixed: &[[u8; 3]], samples: impl IntoIterator<Item = &'a [u8]>) -> Self {
         let mut counts: BTreeMap<[u8; 3], u32> = BTreeMap::new();
         for sample in samples {
             for pixel in sample.chunks_exact(4) {
@@ -42,13 +42,13 @@ impl Palette {
     }
 
     /// Returns the index of the colour nearest to a pixel's red, green and blue.
-    pub fn index(&self, [r, g, b]: [u8; 3]) -> u8 {
+    pub(crate) fn index(&self, [r, g, b]: [u8; 3]) -> u8 {
         let bin = usize::from(r >> 2) << 12 | usize::from(g >> 2) << 6 | usize::from(b >> 2);
         self.nearest[bin]
     }
 
     /// Returns the colours in the order of their indices.
-    pub fn colours(&self) -> &[[u8; 3]] {
+    pub(crate) fn colours(&self) -> &[[u8; 3]] {
         &self.colours
     }
 }

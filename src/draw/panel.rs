@@ -27,7 +27,7 @@ const UNIT: &str = "voxel lengths";
 const BEFORE_UNIT: f64 = 5.0;
 
 /// Draws everything around the world at a frame.
-pub fn panel(walk: &Walk, frame: usize, stage: &Stage) -> Vec<Primitive> {
+pub(crate) fn panel(walk: &Walk, frame: usize, stage: &Stage) -> Vec<Primitive> {
     let z = stage.zoom;
     let mut out =
         vec![Primitive::rectangle([0.0, 0.0], [f64::from(stage.width), stage.panel], colour::PAPER)];
@@ -45,7 +45,7 @@ pub fn panel(walk: &Walk, frame: usize, stage: &Stage) -> Vec<Primitive> {
 
 /// Returns the width at zoom 1, pixels, from which the legend fits beside the words of a walk. The
 /// names of image and robot do not count: they may have any length, and are cut.
-pub fn least_width(walk: &Walk) -> f64 {
+pub(crate) fn least_width(walk: &Walk) -> f64 {
     let recording = walk.recording();
     let large = |text: &str| fonts::width(text, LARGE, true);
     let small = |text: &str| fonts::width(text, SMALL, false);
@@ -65,19 +65,19 @@ pub fn least_width(walk: &Walk) -> f64 {
 
 /// The words about a moment of a walk that every view shows.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Caption {
+pub(crate) struct Caption {
     /// The label of the current image.
-    pub label: String,
+    pub(crate) label: String,
     /// The control steps completed in the phase, their total, and the cycles completed.
-    pub time: String,
+    pub(crate) time: String,
     /// The signed distance in the phase, with the direction as an arrow.
-    pub displacement: String,
+    pub(crate) displacement: String,
     /// The conclusion from the distance ([`answer::verdict`]).
-    pub verdict: String,
+    pub(crate) verdict: String,
 }
 
 /// Returns the words about a frame.
-pub fn readout(walk: &Walk, frame: usize) -> Caption {
+pub(crate) fn readout(walk: &Walk, frame: usize) -> Caption {
     let frames = walk.phase_frames(walk.phase_index(frame));
     // A phase that continues into the next ends with the first frame of that phase.
     let goes_on = frames.end < walk.len() && !walk.is_fresh(walk.phase_index(frame) + 1);
@@ -102,7 +102,7 @@ pub fn readout(walk: &Walk, frame: usize) -> Caption {
 }
 
 /// Formats a distance with its sign and two decimals, or shorter if it is huge.
-pub fn signed(distance: f64) -> String {
+pub(crate) fn signed(distance: f64) -> String {
     let is_short = distance.abs() < 1e5;
     let text = if is_short { number::signed(distance, 2) } else { format!("{distance:+.1e}") };
     text.replace('-', "−")
@@ -174,7 +174,7 @@ fn readouts(walk: &Walk, frame: usize, [x, y]: [f64; 2], room: f64, z: f64, out:
 }
 
 /// Returns the materials of a body.
-pub fn present(body: &Body) -> impl Iterator<Item = Material> {
+pub(crate) fn present(body: &Body) -> impl Iterator<Item = Material> {
     Material::ALL.into_iter().filter(|m| !m.is_empty() && body.voxels().cells().contains(m))
 }
 

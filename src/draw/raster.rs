@@ -17,7 +17,7 @@ const BEYOND: f64 = 8192.0;
 ///
 /// # Errors
 /// Returns [`PictureError::Size`] if the stage has no pixels.
-pub fn picture(walk: &Walk, frame: usize, stage: &Stage) -> Result<Pixmap, PictureError> {
+pub(crate) fn picture(walk: &Walk, frame: usize, stage: &Stage) -> Result<Pixmap, PictureError> {
     let (width, height) = (stage.width, stage.height);
     let mut pixmap = Pixmap::new(width, height).ok_or(PictureError::Size { width, height })?;
     pixmap.fill(tiny_skia::Color::WHITE);
@@ -28,7 +28,7 @@ pub fn picture(walk: &Walk, frame: usize, stage: &Stage) -> Result<Pixmap, Pictu
 }
 
 /// Draws primitives; `to_pixels` maps coordinates to pixels (y down), `zoom` scales line widths.
-pub fn draw(
+pub(crate) fn draw(
     pixmap: &mut Pixmap,
     primitives: &[Primitive],
     zoom: f64,
@@ -77,7 +77,7 @@ fn polyline(points: impl Iterator<Item = [f32; 2]>, closed: bool) -> Option<tiny
 }
 
 /// Returns the paint for a colour.
-pub fn paint(colour: Colour, smooth: bool) -> Paint<'static> {
+pub(crate) fn paint(colour: Colour, smooth: bool) -> Paint<'static> {
     let mut paint = Paint { anti_alias: smooth, ..Paint::default() };
     let [r, g, b] = colour.rgb;
     paint.set_color_rgba8(r, g, b, colour.opacity);
@@ -88,7 +88,7 @@ pub fn paint(colour: Colour, smooth: bool) -> Paint<'static> {
 ///
 /// # Errors
 /// Returns [`PictureError::Encode`] or [`PictureError::Write`].
-pub fn write_png(path: &Path, picture: &Pixmap) -> Result<(), PictureError> {
+pub(crate) fn write_png(path: &Path, picture: &Pixmap) -> Result<(), PictureError> {
     let bytes = picture.encode_png().map_err(|e| PictureError::Encode(e.to_string()))?;
     write_whole(path, &bytes)
 }

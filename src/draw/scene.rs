@@ -9,7 +9,7 @@ use std::str::FromStr;
 
 /// The look of the world.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Look {
+pub(crate) enum Look {
     /// With a ruler on the ground.
     #[default]
     Plain,
@@ -37,7 +37,7 @@ impl FromStr for Look {
 /// Something to draw. Coordinates are in the world (voxel lengths, y up) or in pixels (y down),
 /// depending on the function that creates it.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Primitive {
+pub(crate) enum Primitive {
     /// A filled quadrilateral.
     Quad {
         /// The corners in order.
@@ -80,33 +80,33 @@ const MARK_PIXELS: f64 = 4.0;
 
 impl Primitive {
     /// Creates a filled axis-parallel rectangle between two opposite corners.
-    pub fn rectangle(a: [f64; 2], b: [f64; 2], fill: Colour) -> Self {
+    pub(crate) fn rectangle(a: [f64; 2], b: [f64; 2], fill: Colour) -> Self {
         Primitive::Quad { corners: [a, [b[0], a[1]], b, [a[0], b[1]]], fill, smooth: false }
     }
 
     /// Creates a line between two points.
-    pub fn line(from: [f64; 2], to: [f64; 2], width: f64, colour: Colour) -> Self {
+    pub(crate) fn line(from: [f64; 2], to: [f64; 2], width: f64, colour: Colour) -> Self {
         Primitive::Line { points: vec![from, to], width, colour, smooth: true }
     }
 }
 
 /// A visible part of the world, voxel lengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Window {
+pub(crate) struct Window {
     /// The left edge.
-    pub left: f64,
+    pub(crate) left: f64,
     /// The right edge.
-    pub right: f64,
+    pub(crate) right: f64,
     /// The lower edge, below the ground's surface at 0.
-    pub bottom: f64,
+    pub(crate) bottom: f64,
     /// The upper edge.
-    pub top: f64,
+    pub(crate) top: f64,
     /// The pixels per voxel length; details too small to see are left out.
-    pub scale: f64,
+    pub(crate) scale: f64,
     /// True if voxels have hard edges, whose fewer colours keep animations small.
-    pub crisp: bool,
+    pub(crate) crisp: bool,
     /// The look of the world.
-    pub look: Look,
+    pub(crate) look: Look,
 }
 
 impl Window {
@@ -121,7 +121,7 @@ impl Window {
 
 /// Returns the multiples of `step` voxel lengths from the ruler's `zero` that lie in the window, at
 /// most about 10⁴ of them.
-pub fn ruler(window: &Window, zero: f64, step: f64) -> impl Iterator<Item = f64> + use<> {
+pub(crate) fn ruler(window: &Window, zero: f64, step: f64) -> impl Iterator<Item = f64> + use<> {
     let first = ((window.left - zero) / step).ceil();
     let count = ((window.right - zero) / step).floor() - first + 1.0;
     (0..count.clamp(0.0, 1e4) as u32).map(move |k| (first + f64::from(k)) * step)
@@ -129,7 +129,7 @@ pub fn ruler(window: &Window, zero: f64, step: f64) -> impl Iterator<Item = f64>
 
 /// Draws the world at a frame, from back to front: sky, ground with its ruler, start marks, body,
 /// path of the centre of mass. The ruler's zero is the centre of mass at the start of the rollout.
-pub fn world(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
+pub(crate) fn world(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
     let mut out = ground(walk, frame, window);
     out.extend(body(walk, frame, window));
     out.extend(path(walk, frame, window));

@@ -21,7 +21,7 @@ const MAX_SIDE: usize = 16_384;
 
 /// A reason why a contact sheet cannot be made.
 #[derive(Debug, thiserror::Error)]
-pub enum SheetError {
+pub(crate) enum SheetError {
     /// An image is not available.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
@@ -60,7 +60,7 @@ pub enum SheetError {
 /// # Errors
 /// Returns [`SheetError::Size`] if the sheet would be empty or too large, or
 /// [`SheetError::Dataset`] if an image is not available.
-pub fn contact_sheet(dataset: &Dataset, split: Split, samples: usize) -> Result<Grid<u8>, SheetError> {
+pub(crate) fn contact_sheet(dataset: &Dataset, split: Split, samples: usize) -> Result<Grid<u8>, SheetError> {
     let classes = dataset.classes(split);
     let [rows, columns] = dataset.size(split).map_or([0, 0], shown);
     let [tall, wide] = [rows + GAP, columns + GAP];
@@ -94,7 +94,7 @@ fn shown([height, width]: [usize; 2]) -> [usize; 2] {
 ///
 /// # Errors
 /// Returns [`SheetError::Write`] if the file cannot be written.
-pub fn write_png(file: &Path, picture: &Grid<u8>) -> Result<(), SheetError> {
+pub(crate) fn write_png(file: &Path, picture: &Grid<u8>) -> Result<(), SheetError> {
     let bytes = png(picture)?;
     write_atomically(file, &bytes).map_err(|source| SheetError::Write { file: file.to_path_buf(), source })
 }

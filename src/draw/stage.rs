@@ -6,7 +6,7 @@ use crate::draw::scene::{Look, Window};
 use crate::draw::walk::Walk;
 use std::ops::RangeInclusive;
 
-pub use crate::draw::error::WIDTHS;
+pub(crate) use crate::draw::error::WIDTHS;
 
 /// The height of the panel above the world (stimulus, read-outs, legend), pixels at zoom 1.
 const PANEL: f64 = 104.0;
@@ -24,17 +24,17 @@ const SMOOTHING: usize = 50;
 /// lower edge. If the whole recording fits, the view is fixed; otherwise the camera follows the
 /// centre of mass smoothly.
 #[derive(Clone, Debug)]
-pub struct Stage {
+pub(crate) struct Stage {
     /// The width of the picture, pixels.
-    pub width: u32,
+    pub(crate) width: u32,
     /// The height of the picture, pixels.
-    pub height: u32,
+    pub(crate) height: u32,
     /// The size of letters and lines: 1 up to 720 pixels of width, then larger if the words fit.
-    pub zoom: f64,
+    pub(crate) zoom: f64,
     /// True if the legend fits beside these words.
-    pub has_legend: bool,
+    pub(crate) has_legend: bool,
     /// The height of the panel, pixels.
-    pub panel: f64,
+    pub(crate) panel: f64,
     crisp: bool,
     look: Look,
     scale: f64,
@@ -48,7 +48,7 @@ impl Stage {
     ///
     /// # Errors
     /// Returns [`PictureError::Size`] if the width is not in [`WIDTHS`].
-    pub fn new(walk: &Walk, width: u32) -> Result<Self, PictureError> {
+    pub(crate) fn new(walk: &Walk, width: u32) -> Result<Self, PictureError> {
         if !WIDTHS.contains(&width) {
             return Err(PictureError::Size { width, height: 0 });
         }
@@ -93,22 +93,22 @@ impl Stage {
     }
 
     /// Gives voxels hard edges, whose fewer colours keep animations small.
-    pub fn crisp(self) -> Self {
+    pub(crate) fn crisp(self) -> Self {
         Stage { crisp: true, ..self }
     }
 
     /// Sets the look of the world.
-    pub fn look(self, look: Look) -> Self {
+    pub(crate) fn look(self, look: Look) -> Self {
         Stage { look, ..self }
     }
 
     /// Maps a point of the world to pixels, y down, in the picture of a frame.
-    pub fn to_pixels(&self, frame: usize, [x, y]: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn to_pixels(&self, frame: usize, [x, y]: [f64; 2]) -> [f64; 2] {
         [(x - self.left_edge(frame)) * self.scale, self.surface - y * self.scale]
     }
 
     /// Returns the part of the world in the picture of a frame.
-    pub fn window(&self, frame: usize) -> Window {
+    pub(crate) fn window(&self, frame: usize) -> Window {
         let left = self.left_edge(frame);
         Window {
             left,

@@ -22,13 +22,13 @@ pub struct Walk<'a> {
 
 /// The smallest and largest x, and the largest y, of some points, voxel lengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Extent {
+pub(crate) struct Extent {
     /// The smallest x.
-    pub left: f64,
+    pub(crate) left: f64,
     /// The largest x.
-    pub right: f64,
+    pub(crate) right: f64,
     /// The largest y.
-    pub top: f64,
+    pub(crate) top: f64,
 }
 
 impl<'a> Walk<'a> {
@@ -59,7 +59,7 @@ impl<'a> Walk<'a> {
     }
 
     /// Returns the recording.
-    pub fn recording(&self) -> &'a Recording {
+    pub(crate) fn recording(&self) -> &'a Recording {
         self.recording
     }
 
@@ -68,44 +68,39 @@ impl<'a> Walk<'a> {
         self.recording.frames.len()
     }
 
-    /// Always returns false: a walk has at least one frame.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
     /// Returns the index of the phase that contains a frame.
-    pub fn phase_index(&self, frame: usize) -> usize {
+    pub(crate) fn phase_index(&self, frame: usize) -> usize {
         self.recording.phases.iter().rposition(|p| p.first_frame <= frame).unwrap_or(0)
     }
 
     /// Returns the phase that contains a frame.
-    pub fn phase(&self, frame: usize) -> &'a Phase {
+    pub(crate) fn phase(&self, frame: usize) -> &'a Phase {
         &self.recording.phases[self.phase_index(frame)]
     }
 
     /// Returns the frames of a phase.
-    pub fn phase_frames(&self, phase: usize) -> Range<usize> {
+    pub(crate) fn phase_frames(&self, phase: usize) -> Range<usize> {
         let first = |p: usize| self.recording.phases.get(p).map_or(self.len(), |p| p.first_frame);
         first(phase)..first(phase + 1)
     }
 
     /// Returns true if the phase begins with the robot reset to its start; the first always does.
-    pub fn is_fresh(&self, phase: usize) -> bool {
+    pub(crate) fn is_fresh(&self, phase: usize) -> bool {
         self.fresh.get(phase).copied().unwrap_or(false)
     }
 
     /// Returns the centre of mass at a frame, voxel lengths; the last finite one if necessary.
-    pub fn centre(&self, frame: usize) -> [f64; 2] {
+    pub(crate) fn centre(&self, frame: usize) -> [f64; 2] {
         self.centres[frame.min(self.centres.len() - 1)]
     }
 
     /// Returns the signed distance walked since the phase began, voxel lengths.
-    pub fn displacement(&self, frame: usize) -> f64 {
+    pub(crate) fn displacement(&self, frame: usize) -> f64 {
         self.centre(frame)[0] - self.centre(self.phase(frame).first_frame)[0]
     }
 
     /// Returns the frames of the rollout that contains a frame, from the last reset to the next.
-    pub fn rollout(&self, frame: usize) -> Range<usize> {
+    pub(crate) fn rollout(&self, frame: usize) -> Range<usize> {
         let phase = self.phase_index(frame);
         let resets = || self.fresh.iter().enumerate().filter(|(_, f)| **f).map(|(p, _)| p);
         let first = resets().rfind(|&p| p <= phase).unwrap_or(0);
@@ -114,7 +109,7 @@ impl<'a> Walk<'a> {
     }
 
     /// Returns every drawable voxel of a frame: material and corners (clockwise from the top left).
-    pub fn voxels(&self, frame: usize) -> impl Iterator<Item = (Material, [[f64; 2]; 4])> {
+    pub(crate) fn voxels(&self, frame: usize) -> impl Iterator<Item = (Material, [[f64; 2]; 4])> {
         let body = &self.recording.body;
         self.recording.voxels.iter().filter_map(move |v| {
             let mut quad = [[0.0; 2]; 4];
@@ -126,12 +121,12 @@ impl<'a> Walk<'a> {
     }
 
     /// Returns the sides that belong to a single voxel (the body's outline) at a frame.
-    pub fn outline(&self, frame: usize) -> impl Iterator<Item = [[f64; 2]; 2]> {
+    pub(crate) fn outline(&self, frame: usize) -> impl Iterator<Item = [[f64; 2]; 2]> {
         self.sides_of(frame, true)
     }
 
     /// Returns the sides that two voxels share at a frame.
-    pub fn seams(&self, frame: usize) -> impl Iterator<Item = [[f64; 2]; 2]> {
+    pub(crate) fn seams(&self, frame: usize) -> impl Iterator<Item = [[f64; 2]; 2]> {
         self.sides_of(frame, false)
     }
 
@@ -141,7 +136,7 @@ impl<'a> Walk<'a> {
     }
 
     /// Returns the extent of the body over some frames, or its undeformed box if nothing is finite.
-    pub fn extent(&self, frames: Range<usize>) -> Extent {
+    pub(crate) fn extent(&self, frames: Range<usize>) -> Extent {
         let (height, width) = (self.recording.body.height() as f64, self.recording.body.width() as f64);
         let nothing = Extent { left: f64::INFINITY, right: f64::NEG_INFINITY, top: 0.0 };
         let extent = frames.flat_map(|f| self.recording.frames.get(f)).flat_map(|f| &f.points);
@@ -161,7 +156,7 @@ impl<'a> Walk<'a> {
 
 /// Returns the area of a voxel from its corners (clockwise), square voxel lengths: 1 at rest,
 /// negative when turned inside out.
-pub fn area(quad: &[[f64; 2]; 4]) -> f64 {
+pub(crate) fn area(quad: &[[f64; 2]; 4]) -> f64 {
     let [a, b, c, d] = quad;
     0.5 * ((c[0] - a[0]) * (b[1] - d[1]) - (b[0] - d[0]) * (c[1] - a[1]))
 }

@@ -7,24 +7,24 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Number of inputs: nodes 0 (x), 1 (y), 2 (distance to the centre) and 3 (bias).
-pub const INPUTS: usize = 4;
+pub(crate) const INPUTS: usize = 4;
 /// Number of outputs, one per material in the order of [`Material::ALL`]: nodes 4 … 10.
-pub const OUTPUTS: usize = Material::ALL.len();
+pub(crate) const OUTPUTS: usize = Material::ALL.len();
 /// Number of the first hidden node.
-pub const FIRST_HIDDEN: usize = INPUTS + OUTPUTS;
+pub(crate) const FIRST_HIDDEN: usize = INPUTS + OUTPUTS;
 /// Most hidden nodes of a network (under mutation alone some 20 at most).
-pub const MAX_HIDDEN: usize = 1000;
+pub(crate) const MAX_HIDDEN: usize = 1000;
 
 /// A weighted connection; in files `[from, to, weight]`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(from = "(usize, usize, f64)", into = "(usize, usize, f64)")]
-pub struct Edge {
+pub(crate) struct Edge {
     /// Source node: an input or a hidden node.
-    pub from: usize,
+    pub(crate) from: usize,
     /// Target node: an output or a hidden node.
-    pub to: usize,
+    pub(crate) to: usize,
     /// Weight, finite.
-    pub weight: f64,
+    pub(crate) weight: f64,
 }
 
 /// A compositional pattern-producing network (Stanley 2007; paper, section "Genome").
@@ -41,7 +41,7 @@ pub struct Edge {
 /// the same nodes, and they form no cycle.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "CppnFile", into = "CppnFile")]
-pub struct Cppn {
+pub(crate) struct Cppn {
     pub(super) outputs: [Function; OUTPUTS],
     pub(super) hidden: Vec<Function>,
     /// Sorted by (to, from): a node's incoming edges are one run, summed in this order.
@@ -50,42 +50,42 @@ pub struct Cppn {
 
 impl Cppn {
     /// Returns the start of evolution: inputs fully connected to squashing outputs with weights 0.
-    pub fn initial() -> Self {
+    pub(crate) fn initial() -> Self {
         let pairs = (INPUTS..FIRST_HIDDEN).flat_map(|to| (0..INPUTS).map(move |from| (from, to)));
         let edges = pairs.map(|(from, to)| Edge { from, to, weight: 0.0 }).collect();
         Cppn { outputs: [Function::Squash; OUTPUTS], hidden: Vec::new(), edges }
     }
 
     /// Returns the number of nodes: inputs, outputs and hidden.
-    pub fn node_count(&self) -> usize {
+    pub(crate) fn node_count(&self) -> usize {
         FIRST_HIDDEN + self.hidden.len()
     }
 
     /// Returns the functions of the hidden nodes 11, 12, ….
-    pub fn hidden(&self) -> &[Function] {
+    pub(crate) fn hidden(&self) -> &[Function] {
         &self.hidden
     }
 
     /// Returns all edges, sorted by target, then by source.
-    pub fn edges(&self) -> &[Edge] {
+    pub(crate) fn edges(&self) -> &[Edge] {
         &self.edges
     }
 
     /// Returns the edges into a node, sorted by source.
-    pub fn incoming(&self, node: usize) -> &[Edge] {
+    pub(crate) fn incoming(&self, node: usize) -> &[Edge] {
         let start = self.edges.partition_point(|e| e.to < node);
         let count = self.edges[start..].partition_point(|e| e.to == node);
         &self.edges[start..start + count]
     }
 
     /// Returns the function of an output or hidden node; `None` for inputs and unused numbers.
-    pub fn function(&self, node: usize) -> Option<Function> {
+    pub(crate) fn function(&self, node: usize) -> Option<Function> {
         let (outputs, hidden) = (node.checked_sub(INPUTS)?, node.checked_sub(FIRST_HIDDEN));
         self.outputs.get(outputs).or_else(|| self.hidden.get(hidden?)).copied()
     }
 
     /// Returns all nodes, each after its predecessors.
-    pub fn topological_order(&self) -> Vec<usize> {
+    pub(crate) fn topological_order(&self) -> Vec<usize> {
         // Kahn's algorithm; nodes on a cycle are never reached.
         let mut waiting_for = vec![0; self.node_count()];
         let mut successors = vec![Vec::new(); self.node_count()];
@@ -109,7 +109,7 @@ impl Cppn {
 
     /// Returns the content in bytes, equal for equal networks and only for them: numbers
     /// little-endian, weights as bits. Ids are made of it, so it must not change within a version.
-    pub fn canonical_bytes(&self) -> Vec<u8> {
+    pub(crate) fn canonical_bytes(&self) -> Vec<u8> {
         let mut bytes = VERSION.to_le_bytes().to_vec();
         bytes.extend(self.outputs.iter().map(|f| *f as u8));
         bytes.extend((self.hidden.len() as u64).to_le_bytes());

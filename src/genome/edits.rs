@@ -12,11 +12,11 @@ use std::collections::BTreeMap;
 /// outside a body's grid have no effect.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "Vec<(usize, usize, Material)>", into = "Vec<(usize, usize, Material)>")]
-pub struct Edits(BTreeMap<(usize, usize), Material>);
+pub(crate) struct Edits(pub(super) BTreeMap<(usize, usize), Material>);
 
 /// The reason why a list is not one of edits.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum EditError {
+pub(crate) enum EditError {
     /// A voxel is beyond the largest body.
     #[error("edits: row {0}, column {1}: bodies have at most {MAX_SIDE} rows and columns")]
     Place(usize, usize),
@@ -27,13 +27,8 @@ pub enum EditError {
 
 impl Edits {
     /// Returns true if the body is exactly the network's.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.0.is_empty()
-    }
-
-    /// Returns the number of voxels that differ.
-    pub fn len(&self) -> usize {
-        self.0.len()
     }
 
     /// Makes the voxel at (row, column) of `material`, where the network has `described`.
@@ -105,7 +100,7 @@ mod tests {
     fn what_is_as_described_is_no_edit() {
         let mut edits = Edits::default();
         edits.set((1, 2), Material::Rigid, Material::Soft);
-        assert_eq!(edits.len(), 1);
+        assert_eq!(edits.0.len(), 1);
         edits.set((1, 2), Material::Soft, Material::Soft);
         assert!(edits.is_empty());
     }

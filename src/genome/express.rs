@@ -16,7 +16,7 @@ impl Cppn {
     ///
     /// # Errors
     /// Returns a [`BodyError`] if there is no cell, or more than [`MAX_SIDE`] rows or columns.
-    pub fn express(&self, height: usize, width: usize) -> Result<Body, BodyError> {
+    pub(crate) fn express(&self, height: usize, width: usize) -> Result<Body, BodyError> {
         if height == 0 || width == 0 {
             return Err(GridError::Empty.into());
         }

@@ -23,7 +23,7 @@ pub(super) struct CppnFile {
 
 /// The reason why a file does not hold a CPPN.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum CppnError {
+pub(crate) enum CppnError {
     /// The file has another version of the form.
     #[error("version {0} of the CPPN form is unknown; expected {VERSION} (made by a newer morphcog?)")]
     Version(u32),

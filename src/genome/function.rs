@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[repr(u8)]
-pub enum Function {
+pub(crate) enum Function {
     /// 2 / (1 + e^−s) − 1, in (−1, 1); outputs only.
     Squash = 0,
     /// sin s.
@@ -32,7 +32,7 @@ const LIMIT: f64 = 1e100;
 
 impl Function {
     /// All functions, the output's squash first.
-    pub const ALL: [Function; 8] = [
+    pub(crate) const ALL: [Function; 8] = [
         Function::Squash,
         Function::Sin,
         Function::Abs,
@@ -44,12 +44,12 @@ impl Function {
     ];
 
     /// Returns the functions allowed in a hidden node: all but squash.
-    pub fn for_hidden() -> &'static [Function] {
+    pub(crate) fn for_hidden() -> &'static [Function] {
         &Self::ALL[1..]
     }
 
     /// Replaces every sum by the function's value, at most 10¹⁰⁰ in size; NaN becomes 0.
-    pub fn apply(self, sums: &mut [f64]) {
+    pub(crate) fn apply(self, sums: &mut [f64]) {
         match self {
             Function::Squash => each(sums, |s| 2.0 / (1.0 + libm::exp(-s)) - 1.0),
             Function::Sin => each(sums, libm::sin),

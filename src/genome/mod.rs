@@ -1,12 +1,12 @@
 //! Genomes. A [`Genome`] describes a [`Body`]; it knows nothing of physics, tasks or archives.
 
-pub mod cppn;
+pub(crate) mod cppn;
 mod edits;
 mod express;
 mod file;
-pub mod function;
-pub mod mutation;
-pub mod params;
+pub(crate) mod function;
+pub(crate) mod mutation;
+pub(crate) mod params;
 mod voxels;
 
 use crate::base::hash;
@@ -14,13 +14,12 @@ use crate::base::random::Stream;
 use crate::base::session::Session;
 use crate::base::stop::Stopped;
 use crate::body::{Body, BodyError};
-pub use cppn::Cppn;
-pub use edits::{EditError, Edits};
-pub use file::CppnError;
-pub use params::MutationParams;
+pub(crate) use cppn::Cppn;
+pub(crate) use edits::Edits;
+pub(crate) use params::MutationParams;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-pub use voxels::other_voxel;
+pub(crate) use voxels::other_voxel;
 
 /// The object of evolution: a network that describes a body, and single voxels in which the body
 /// differs. In files `{"cppn": …, "edits": …}`, see [`Cppn`] and [`Edits`].
@@ -38,16 +37,16 @@ pub struct Genome {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BodySpec {
     /// Rows.
-    pub height: usize,
+    pub(crate) height: usize,
     /// Columns.
-    pub width: usize,
+    pub(crate) width: usize,
     /// Least number of muscle voxels.
-    pub min_muscles: usize,
+    pub(crate) min_muscles: usize,
 }
 
 /// Most mutations in a row without a valid body. (On 14 × 14 voxels a random individual needs about
 /// 25, seldom above 150; an offspring two or three.)
-pub const MAX_MUTATIONS: usize = 100_000;
+pub(crate) const MAX_MUTATIONS: usize = 100_000;
 
 /// Mutations between two checks for a stop.
 const MUTATIONS_AT_ONCE: usize = 200;
@@ -84,18 +83,8 @@ impl Genome {
         Genome { cppn: Cppn::initial(), edits: Edits::default() }
     }
 
-    /// Returns its network.
-    pub fn cppn(&self) -> &Cppn {
-        &self.cppn
-    }
-
-    /// Returns the voxels that differ from the network's description.
-    pub fn edits(&self) -> &Edits {
-        &self.edits
-    }
-
     /// Applies one random mutation to the network (paper, section "Genome").
-    pub fn mutate(&mut self, params: &MutationParams, rng: &mut Stream) {
+    pub(crate) fn mutate(&mut self, params: &MutationParams, rng: &mut Stream) {
         mutation::mutate(&mut self.cppn, params, rng);
     }
 
@@ -103,7 +92,7 @@ impl Genome {
     ///
     /// # Errors
     /// Returns a [`BodyError`] if the size is impossible for a body.
-    pub fn body(&self, height: usize, width: usize) -> Result<Body, BodyError> {
+    pub(crate) fn body(&self, height: usize, width: usize) -> Result<Body, BodyError> {
         let described = self.cppn.express(height, width)?;
         if self.edits.is_empty() { Ok(described) } else { Body::new(self.edits.apply(&described)) }
     }
@@ -133,7 +122,7 @@ impl Genome {
     }
 
     /// Returns true if an id is this genome's; in older files it may begin with a digit.
-    pub fn has_id(&self, id: &str) -> bool {
+    pub(crate) fn has_id(&self, id: &str) -> bool {
         id == self.id() || id == &self.digest()[..10]
     }
 
@@ -160,7 +149,7 @@ impl Genome {
     ///
     /// # Errors
     /// Returns [`GenomeError::Stopped`] if it was stopped; otherwise as [`Genome::offspring`].
-    pub fn offspring_unless(
+    pub(crate) fn offspring_unless(
         &self,
         spec: BodySpec,
         params: &MutationParams,
@@ -219,7 +208,7 @@ impl Genome {
     ///
     /// # Errors
     /// Returns [`GenomeError::Stopped`] if it was stopped; otherwise as [`Genome::offspring`].
-    pub fn random_unless(
+    pub(crate) fn random_unless(
         spec: BodySpec,
         params: &MutationParams,
         rng: &mut Stream,

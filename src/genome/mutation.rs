@@ -7,7 +7,7 @@ use crate::genome::params::MutationParams;
 
 /// One kind of mutation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mutation {
+pub(crate) enum Mutation {
     /// Splits an edge by a hidden node with a random function: the edge's weight in, weight 1 out.
     AddNode,
     /// Removes a hidden node; joins each predecessor to each successor by the product of the two
@@ -29,7 +29,7 @@ const EDGE_DRAWS: usize = 100;
 
 impl Mutation {
     /// All six, each with the same probability.
-    pub const ALL: [Mutation; 6] = [
+    pub(crate) const ALL: [Mutation; 6] = [
         Mutation::AddNode,
         Mutation::RemoveNode,
         Mutation::AddEdge,
@@ -39,7 +39,7 @@ impl Mutation {
     ];
 
     /// Mutates a network; returns false and leaves it unchanged if that is impossible.
-    pub fn apply(self, cppn: &mut Cppn, params: &MutationParams, rng: &mut Stream) -> bool {
+    pub(crate) fn apply(self, cppn: &mut Cppn, params: &MutationParams, rng: &mut Stream) -> bool {
         let applied = match self {
             Mutation::AddNode => add_node(cppn, rng),
             Mutation::RemoveNode => remove_node(cppn, params, rng),
@@ -58,7 +58,7 @@ impl Mutation {
 }
 
 /// Applies one random mutation; an impossible one (nothing to remove …) is drawn again.
-pub fn mutate(cppn: &mut Cppn, params: &MutationParams, rng: &mut Stream) -> Mutation {
+pub(crate) fn mutate(cppn: &mut Cppn, params: &MutationParams, rng: &mut Stream) -> Mutation {
     loop {
         // The loop ends: a function can always be changed.
         let mutation = Mutation::ALL[rng.below(Mutation::ALL.len())];

@@ -9,21 +9,21 @@ use serde::{Deserialize, Deserializer, Serialize};
 pub struct MutationParams {
     /// Standard deviation of the change of a weight. Default 0.5.
     #[serde(deserialize_with = "size")]
-    pub weight_sigma: f64,
+    pub(crate) weight_sigma: f64,
     /// Limit of a changed weight, which is clipped to [−limit, limit]. Default 1.
     #[serde(deserialize_with = "size")]
-    pub weight_limit: f64,
+    pub(crate) weight_limit: f64,
     /// Absolute weight of an added edge; its sign is random. Default 0.1.
     #[serde(deserialize_with = "size")]
-    pub new_edge_weight: f64,
+    pub(crate) new_edge_weight: f64,
     /// Fraction of offspring in which voxels are mutated instead of the network
     /// ([`Edits`](crate::genome::Edits)). Default 0, as in the paper; then left out of files.
     #[serde(deserialize_with = "share", skip_serializing_if = "is_zero")]
-    pub voxel_mutations: f64,
+    pub(crate) voxel_mutations: f64,
     /// Most voxels of an offspring that change: 1, 2, 4 and so on, doubled up to this, with equal
     /// probability. Default 1; then left out of files.
     #[serde(deserialize_with = "changes", skip_serializing_if = "is_one")]
-    pub voxel_changes: u16,
+    pub(crate) voxel_changes: u16,
 }
 
 impl Default for MutationParams {

@@ -28,7 +28,7 @@ impl Genome {
 }
 
 /// Draws a place, (row, column), and one of the six other materials, all equally likely.
-pub fn other_voxel(voxels: &Grid<Material>, rng: &mut Stream) -> ((usize, usize), Material) {
+pub(crate) fn other_voxel(voxels: &Grid<Material>, rng: &mut Stream) -> ((usize, usize), Material) {
     let place = (rng.below(voxels.height()), rng.below(voxels.width()));
     let step = 1 + rng.below(Material::ALL.len() - 1);
     (place, Material::ALL[(usize::from(voxels[place].code()) + step) % Material::ALL.len()])
@@ -67,21 +67,21 @@ mod tests {
         let always = MutationParams { voxel_mutations: 1.0, ..MutationParams::default() };
         let rng = &mut rng(3);
         let (mut parent, mut body) = Genome::random(PAPER, &always, rng).unwrap();
-        assert!(parent.edits().is_empty());
+        assert!(parent.edits.0.is_empty());
         for _ in 0..200 {
             let (child, changed) = parent.offspring(PAPER, &always, rng).unwrap();
             let pairs = body.voxels().cells().iter().zip(changed.voxels().cells());
             assert_eq!(pairs.filter(|(before, after)| before != after).count(), 1);
-            assert!(child.cppn() == parent.cppn() && child.id() != parent.id() && changed.is_valid(3));
+            assert!(child.cppn == parent.cppn && child.id() != parent.id() && changed.is_valid(3));
             (parent, body) = (child, changed);
         }
-        assert!((20..=196).contains(&parent.edits().len()), "{}", parent.edits().len());
+        assert!((20..=196).contains(&parent.edits.0.len()), "{}", parent.edits.0.len());
         // The network goes on mutating below the edits, and files keep both.
         let text = serde_json::to_string(&parent).unwrap();
         let read: Genome = serde_json::from_str(&text).unwrap();
         assert_eq!((read.id(), read.body(14, 14)), (parent.id(), Ok(body)));
         let (child, _) = read.offspring(PAPER, &MutationParams::default(), rng).unwrap();
-        assert!(child.edits() == read.edits() && child.cppn() != read.cppn());
+        assert!(child.edits == read.edits && child.cppn != read.cppn);
     }
 
     #[test]

@@ -15,9 +15,9 @@ use std::path::Path;
 #[derive(Clone, Debug)]
 pub struct TrainingImages {
     /// Dataset of the images.
-    pub dataset: DatasetRef,
+    pub(crate) dataset: DatasetRef,
     /// Images, in the order of a sequential rollout.
-    pub images: Vec<ImageRef>,
+    pub(crate) images: Vec<ImageRef>,
     /// Stimuli, H × W in [0, 1]: the images as the sensors see them or, where a response is
     /// measured, as many made from their pixels.
     pub stimuli: Vec<Grid<f64>>,
@@ -111,7 +111,7 @@ impl TrainingImages {
     }
 
     /// Describes the images to the user, one by one if they are few.
-    pub fn listed(&self) -> String {
+    pub(crate) fn listed(&self) -> String {
         const FEW: usize = 8;
         if self.images.len() > FEW {
             let mut classes: Vec<u8> = self.images.iter().map(|image| image.label).collect();

@@ -52,7 +52,7 @@ impl Whereabouts {
 
     /// Adds the folder that a run remembers, by its run.json or another file beside it.
     #[must_use]
-    pub fn and_of(mut self, run_json: &Path) -> Self {
+    pub(crate) fn and_of(mut self, run_json: &Path) -> Self {
         self.remembered.push(run_json.with_file_name(DATA_FOLDER));
         self.run_json.get_or_insert_with(|| run_json.to_path_buf());
         self
@@ -203,7 +203,7 @@ pub fn load_dataset(config: &Config, data: Option<&Path>, wanted: &[Split]) -> R
 ///
 /// # Errors
 /// As [`load_dataset`]; also if it is another dataset, whose indices mean other images.
-pub fn load_dataset_of(
+pub(crate) fn load_dataset_of(
     run: Option<&DatasetRef>,
     config: &Config,
     data: &Whereabouts,
@@ -280,7 +280,7 @@ pub(crate) fn see_all(
 ///
 /// # Errors
 /// Returns an error if the image does not fit the body's size.
-pub fn seen(
+pub(crate) fn seen(
     &BodyConfig { height, width, .. }: &BodyConfig,
     params: &StimulusParams,
     dataset: &Dataset,

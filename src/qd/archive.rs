@@ -6,13 +6,13 @@ use std::collections::BTreeMap;
 
 /// The best solution of a cell.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Elite<S> {
+pub(crate) struct Elite<S> {
     /// Index of its cell, see [`crate::qd::DescriptorSpace`].
-    pub cell: usize,
+    pub(crate) cell: usize,
     /// Its fitness, finite.
-    pub objective: f64,
+    pub(crate) objective: f64,
     /// The solution.
-    pub solution: S,
+    pub(crate) solution: S,
 }
 
 /// At most one [`Elite`] per cell (Mouret & Clune 2015). In files a list in the cells' order.
@@ -24,7 +24,7 @@ pub struct Archive<S> {
 
 /// The outcome of an insertion into an [`Archive`].
 #[derive(Clone, Debug, PartialEq)]
-pub enum Insertion<S> {
+pub(crate) enum Insertion<S> {
     /// The cell was empty.
     New,
     /// The solution is strictly fitter than the elite it replaced.
@@ -38,7 +38,7 @@ pub enum Insertion<S> {
 
 /// The reason why a solution cannot be in an archive.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum ArchiveError {
+pub(crate) enum ArchiveError {
     /// A fitness is infinite or NaN.
     #[error("cell {cell}: the objective is {objective}, expected a finite number")]
     Objective {
@@ -56,22 +56,22 @@ pub enum ArchiveError {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ArchiveStats {
     /// Number of elites.
-    pub num_elites: usize,
+    pub(crate) num_elites: usize,
     /// Elites per possible cell.
-    pub coverage: f64,
+    pub(crate) coverage: f64,
     /// Σ (objective − offset) over the elites; negative if they are below the offset on average.
-    pub qd_score: f64,
+    pub(crate) qd_score: f64,
     /// QD score per possible cell.
-    pub norm_qd_score: f64,
+    pub(crate) norm_qd_score: f64,
     /// Largest objective, none in an empty archive.
     pub obj_max: Option<f64>,
     /// Mean objective, none in an empty archive.
-    pub obj_mean: Option<f64>,
+    pub(crate) obj_mean: Option<f64>,
 }
 
 impl<S> Archive<S> {
     /// Makes an archive without elites.
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Archive { elites: BTreeMap::new() }
     }
 
@@ -79,7 +79,7 @@ impl<S> Archive<S> {
     ///
     /// # Errors
     /// Returns [`ArchiveError::Objective`] if the fitness is not finite.
-    pub fn insert(&mut self, new: Elite<S>) -> Result<Insertion<S>, ArchiveError> {
+    pub(crate) fn insert(&mut self, new: Elite<S>) -> Result<Insertion<S>, ArchiveError> {
         let Elite { cell, objective, .. } = new;
         if !objective.is_finite() {
             return Err(ArchiveError::Objective { cell, objective });
@@ -92,7 +92,7 @@ impl<S> Archive<S> {
     }
 
     /// Removes all but the `count` fittest of each kind; the first cells win a tie.
-    pub fn retain_fittest<K: Ord>(&mut self, count: usize, kind: impl Fn(&S) -> K) {
+    pub(crate) fn retain_fittest<K: Ord>(&mut self, count: usize, kind: impl Fn(&S) -> K) {
         let mut ranked: Vec<(f64, usize)> = self.elites().map(|e| (e.objective, e.cell)).collect();
         // A stable sort: elites come in the order of their cells.
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -108,7 +108,7 @@ impl<S> Archive<S> {
     }
 
     /// Returns the objective of the `count`-th fittest elite (from 1) of a kind, if it exists.
-    pub fn nth_fittest(&self, count: usize, of: impl Fn(&S) -> bool) -> Option<f64> {
+    pub(crate) fn nth_fittest(&self, count: usize, of: impl Fn(&S) -> bool) -> Option<f64> {
         let mut objectives: Vec<f64> =
             self.elites().filter(|e| of(&e.solution)).map(|e| e.objective).collect();
         objectives.sort_by(|a, b| b.total_cmp(a));
@@ -116,32 +116,27 @@ impl<S> Archive<S> {
     }
 
     /// Returns the elite of a cell.
-    pub fn get(&self, cell: usize) -> Option<&Elite<S>> {
+    pub(crate) fn get(&self, cell: usize) -> Option<&Elite<S>> {
         self.elites.get(&cell)
     }
 
     /// Returns the fitness to beat in a cell.
-    pub fn objective(&self, cell: usize) -> Option<f64> {
+    pub(crate) fn objective(&self, cell: usize) -> Option<f64> {
         self.get(cell).map(|elite| elite.objective)
     }
 
     /// Returns the number of elites.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.elites.len()
     }
 
-    /// Returns true if there is no elite.
-    pub fn is_empty(&self) -> bool {
-        self.elites.is_empty()
-    }
-
     /// Iterates over the elites in the order of their cells.
-    pub fn elites(&self) -> impl Iterator<Item = &Elite<S>> {
+    pub(crate) fn elites(&self) -> impl Iterator<Item = &Elite<S>> {
         self.elites.values()
     }
 
     /// Returns the fittest elite; the first cell wins a tie.
-    pub fn best(&self) -> Option<&Elite<S>> {
+    pub(crate) fn best(&self) -> Option<&Elite<S>> {
         self.elites().reduce(|best, e| if e.objective > best.objective { e } else { best })
     }
 
@@ -237,7 +232,7 @@ mod tests {
         for objective in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             assert!(matches!(archive.insert(elite(0, objective, 'a')), Err(ArchiveError::Objective { .. })));
         }
-        assert!(archive.is_empty());
+        assert_eq!(archive.len(), 0);
     }
 
     #[test]

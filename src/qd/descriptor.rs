@@ -3,41 +3,36 @@
 /// A box of cells with named dimensions. A cell is identified by its coordinates (one bin per
 /// dimension) or by its index, in which the last dimension runs fastest.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct DescriptorSpace {
+pub(crate) struct DescriptorSpace {
     dimensions: Vec<(String, usize)>,
 }
 
 impl DescriptorSpace {
     /// Makes a space with these dimensions: name and number of bins.
-    pub fn new(dimensions: Vec<(String, usize)>) -> Self {
+    pub(crate) fn new(dimensions: Vec<(String, usize)>) -> Self {
         DescriptorSpace { dimensions }
     }
 
     /// Makes the paper's space (section "MAP-Elites"): muscle, sensor and total voxels in seven
     /// bins each, and the task if there are several.
-    pub fn voxel_counts(tasks: usize) -> Self {
+    pub(crate) fn voxel_counts(tasks: usize) -> Self {
         let counts = ["muscle", "sensor", "total"].map(|name| (name.to_string(), COUNT_BINS));
         let task = (tasks > 1).then(|| ("task".to_string(), tasks));
         DescriptorSpace::new(counts.into_iter().chain(task).collect())
     }
 
     /// Returns the names and numbers of bins of the dimensions.
-    pub fn dimensions(&self) -> &[(String, usize)] {
+    pub(crate) fn dimensions(&self) -> &[(String, usize)] {
         &self.dimensions
     }
 
     /// Returns the number of cells, possible or not.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.dimensions.iter().map(|(_, bins)| bins).product()
     }
 
-    /// Returns true if there is no cell because a dimension has no bins.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
     /// Returns the index of the cell with these coordinates, `None` if they are not in the space.
-    pub fn index(&self, coordinates: &[usize]) -> Option<usize> {
+    pub(crate) fn index(&self, coordinates: &[usize]) -> Option<usize> {
         if coordinates.len() != self.dimensions.len() {
             return None;
         }
@@ -46,7 +41,7 @@ impl DescriptorSpace {
     }
 
     /// Returns the coordinates of a cell, `None` if no cell has this index.
-    pub fn coordinates(&self, index: usize) -> Option<Vec<usize>> {
+    pub(crate) fn coordinates(&self, index: usize) -> Option<Vec<usize>> {
         if index >= self.len() {
             return None;
         }
@@ -61,7 +56,7 @@ impl DescriptorSpace {
 }
 
 /// Number of bins of each count.
-pub const COUNT_BINS: usize = 7;
+pub(crate) const COUNT_BINS: usize = 7;
 
 /// Returns the width of a bin of counts on a grid with `area` cells.
 fn bin_width(area: usize) -> usize {
@@ -69,7 +64,7 @@ fn bin_width(area: usize) -> usize {
 }
 
 /// Returns a count's bin on a grid of `area` cells: min(count div max(area div 7, 1), 6).
-pub fn count_bin(count: usize, area: usize) -> usize {
+pub(crate) fn count_bin(count: usize, area: usize) -> usize {
     (count / bin_width(area)).min(COUNT_BINS - 1)
 }
 
@@ -77,7 +72,7 @@ pub fn count_bin(count: usize, area: usize) -> usize {
 /// connected body on a grid of `area` cells with at least `min_muscles` muscles can have: muscle +
 /// sensor ≤ total ≤ area, total ≥ 1. For 14 × 14 voxels they are 90 of 343 ("archive of size 90"),
 /// times the number of tasks.
-pub fn possible_cells(area: usize, min_muscles: usize, tasks: usize) -> Vec<usize> {
+pub(crate) fn possible_cells(area: usize, min_muscles: usize, tasks: usize) -> Vec<usize> {
     let space = DescriptorSpace::voxel_counts(tasks);
     let width = bin_width(area);
     // Least and largest count in a bin, if there is one: the last bin takes the remainder.

@@ -11,11 +11,11 @@ use std::num::NonZeroU16;
 #[serde(deny_unknown_fields, default)]
 pub struct EmitterParams {
     /// Random individuals of a generation that starts with an empty archive: the first. Default 20.
-    pub initial: NonZeroU16,
+    pub(crate) initial: NonZeroU16,
     /// Most elites that become parents, with one offspring each. Default 20.
     pub parents: u16,
     /// Random individuals of later generations. Default 0.
-    pub random_immigrants: u16,
+    pub(crate) random_immigrants: u16,
 }
 
 impl Default for EmitterParams {
@@ -27,18 +27,18 @@ impl Default for EmitterParams {
 
 /// A solution to be made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Proposal {
+pub(crate) struct Proposal {
     /// Generation, from 0.
-    pub generation: u64,
+    pub(crate) generation: u64,
     /// Number within the generation, from 0.
-    pub child: u64,
+    pub(crate) child: u64,
     /// Cell of its parent; `None` for a random individual.
-    pub parent: Option<usize>,
+    pub(crate) parent: Option<usize>,
 }
 
 /// Makes solutions. All chance must come from streams of (generation, child) and the run's seed, so
 /// that solutions may be made in any order and on any thread.
-pub trait Variation<S> {
+pub(crate) trait Variation<S> {
     /// The reason why a solution could not be made.
     type Error;
 
@@ -59,7 +59,7 @@ impl EmitterParams {
     /// Returns the composition of `generation`: offspring of different elites drawn uniformly, then
     /// random immigrants. While the archive is empty (in the first generation, and later if no
     /// individual was stable), all are random individuals.
-    pub fn ask<S>(&self, archive: &Archive<S>, seed: u64, generation: u64) -> Vec<Proposal> {
+    pub(crate) fn ask<S>(&self, archive: &Archive<S>, seed: u64, generation: u64) -> Vec<Proposal> {
         let cells: Vec<usize> = archive.elites().map(|e| e.cell).collect();
         let mut rng = stream(seed, Purpose::Parents, generation, 0);
         let drawn = rng.sample(cells.len(), usize::from(self.parents));

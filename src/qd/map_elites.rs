@@ -9,7 +9,7 @@ use crate::qd::emitter::{EmitterParams, Proposal, Variation};
 /// evaluated in any order and on any threads; [`tell`](MapElites::tell) adds them to the archive in
 /// the order of their numbers. So nothing depends on which was first.
 #[derive(Clone, Debug)]
-pub struct MapElites<S> {
+pub(crate) struct MapElites<S> {
     seed: u64,
     params: EmitterParams,
     archive: Archive<S>,
@@ -17,35 +17,35 @@ pub struct MapElites<S> {
 
 /// A solution and its evaluation.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Evaluated<S> {
+pub(crate) struct Evaluated<S> {
     /// Number within the generation.
-    pub child: u64,
+    pub(crate) child: u64,
     /// Its cell.
-    pub cell: usize,
+    pub(crate) cell: usize,
     /// Its fitness, finite.
-    pub objective: f64,
+    pub(crate) objective: f64,
     /// The solution.
-    pub solution: S,
+    pub(crate) solution: S,
 }
 
 impl<S> MapElites<S> {
     /// Starts a search with an archive, or continues one.
-    pub fn new(seed: u64, params: EmitterParams, archive: Archive<S>) -> Self {
+    pub(crate) fn new(seed: u64, params: EmitterParams, archive: Archive<S>) -> Self {
         MapElites { seed, params, archive }
     }
 
     /// Returns the archive of the elites found so far.
-    pub fn archive(&self) -> &Archive<S> {
+    pub(crate) fn archive(&self) -> &Archive<S> {
         &self.archive
     }
 
     /// Removes elites from the archive; see [`Archive::retain_fittest`].
-    pub fn retain_fittest<K: Ord>(&mut self, count: usize, kind: impl Fn(&S) -> K) {
+    pub(crate) fn retain_fittest<K: Ord>(&mut self, count: usize, kind: impl Fn(&S) -> K) {
         self.archive.retain_fittest(count, kind);
     }
 
     /// Returns the composition of a generation; see [`EmitterParams::ask`].
-    pub fn ask(&self, generation: u64) -> Vec<Proposal> {
+    pub(crate) fn ask(&self, generation: u64) -> Vec<Proposal> {
         self.params.ask(&self.archive, self.seed, generation)
     }
 
@@ -53,7 +53,7 @@ impl<S> MapElites<S> {
     ///
     /// # Errors
     /// Returns the variation's error.
-    pub fn make<V: Variation<S>>(&self, proposal: Proposal, variation: &V) -> Result<S, V::Error> {
+    pub(crate) fn make<V: Variation<S>>(&self, proposal: Proposal, variation: &V) -> Result<S, V::Error> {
         let Proposal { generation, child, parent } = proposal;
         match parent.and_then(|cell| self.archive.get(cell)) {
             Some(elite) => variation.offspring(&elite.solution, generation, child),
@@ -66,7 +66,7 @@ impl<S> MapElites<S> {
     ///
     /// # Errors
     /// Returns an [`ArchiveError`] if a fitness is not finite; the archive has earlier solutions.
-    pub fn tell(
+    pub(crate) fn tell(
         &mut self,
         mut generation: Vec<Evaluated<S>>,
     ) -> Result<Vec<(u64, Insertion<S>)>, ArchiveError> {

@@ -1,11 +1,11 @@
 //! Quality diversity. Knows neither genomes nor bodies: a solution is any type `S`.
 
-pub mod archive;
-pub mod descriptor;
-pub mod emitter;
-pub mod map_elites;
+pub(crate) mod archive;
+pub(crate) mod descriptor;
+pub(crate) mod emitter;
+pub(crate) mod map_elites;
 
-pub use archive::{Archive, ArchiveStats, Elite, Insertion};
-pub use descriptor::DescriptorSpace;
-pub use emitter::{EmitterParams, Proposal, Variation};
-pub use map_elites::{Evaluated, MapElites};
+pub(crate) use archive::{Archive, ArchiveStats, Elite};
+pub(crate) use descriptor::DescriptorSpace;
+pub(crate) use emitter::{EmitterParams, Proposal, Variation};
+pub(crate) use map_elites::{Evaluated, MapElites};

@@ -25,16 +25,16 @@ const NONE: f64 = 1e-9;
 
 /// An estimate with its standard error.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
+pub(crate) struct Estimate {
     /// The estimate.
-    pub value: f64,
+    pub(crate) value: f64,
     /// Its standard error.
-    pub error: f64,
+    pub(crate) error: f64,
 }
 
 impl Estimate {
     /// Returns its 95 % interval.
-    pub fn interval(&self) -> [f64; 2] {
+    pub(crate) fn interval(&self) -> [f64; 2] {
         [-INTERVAL, INTERVAL].map(|errors| self.value + errors * self.error)
     }
 
@@ -48,11 +48,11 @@ impl Estimate {
 
 /// The estimated results of training a gait.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Trainability {
+pub(crate) struct Trainability {
     /// Mean clipped margin of its answers: from −1 to 1.
-    pub fitness: Estimate,
+    pub(crate) fitness: Estimate,
     /// Fraction of its answers that are correct.
-    pub accuracy: Estimate,
+    pub(crate) accuracy: Estimate,
 }
 
 /// Estimates the results of training a gait on examples, from its rollouts with random images;
@@ -68,7 +68,7 @@ pub struct Trainability {
 ///
 /// # Errors
 /// Returns [`Stopped`] if `stop` was set in the meantime.
-pub fn teachable(
+pub(crate) fn teachable(
     shown: &[RandomRollout],
     scatter: f64,
     examples: &[Example],

@@ -7,13 +7,13 @@ use crate::sim::{Physics, width};
 use std::ops::Range;
 
 /// Materials that a place can have without changing the gait.
-pub const CHOICES: [Material; 3] = [Material::Soft, Material::SensorExpand, Material::SensorShrink];
+pub(crate) const CHOICES: [Material; 3] = [Material::Soft, Material::SensorExpand, Material::SensorShrink];
 
 /// Materials that a [design problem](super::lesson) chooses from: sensors. A response is measured
 /// with sensors at all places, so it does not cover soft voxels. A soft voxel differs from a sensor
 /// at rest: it has no goal, so the sides that it shares take its neighbour's goal, and its springs
 /// have another stiffness (`physics.md`, "Actuation").
-pub const SENSORS: [Material; 2] = [CHOICES[CHOSEN.start], CHOICES[CHOSEN.start + 1]];
+pub(crate) const SENSORS: [Material; 2] = [CHOICES[CHOSEN.start], CHOICES[CHOSEN.start + 1]];
 
 /// Indices of [`SENSORS`] in [`CHOICES`].
 pub(super) const CHOSEN: Range<usize> = 1..CHOICES.len();
@@ -31,7 +31,7 @@ pub struct Gait {
 }
 
 /// A material of [`CHOICES`] for each place of a gait, in the places' order.
-pub type Design = Vec<Material>;
+pub(crate) type Design = Vec<Material>;
 
 impl Gait {
     /// Returns the gait of a body; `None` if it has neither soft voxels nor sensors.
@@ -48,7 +48,7 @@ impl Gait {
     }
 
     /// Returns the materials at the places of its own body.
-    pub fn design(&self) -> Design {
+    pub(crate) fn design(&self) -> Design {
         self.places.iter().map(|place| self.body.voxels()[*place]).collect()
     }
 
@@ -56,7 +56,7 @@ impl Gait {
     ///
     /// # Panics
     /// If the design does not have one material for each place.
-    pub fn built(&self, design: &[Material]) -> Body {
+    pub(crate) fn built(&self, design: &[Material]) -> Body {
         assert_eq!(design.len(), self.places.len(), "a design has one material for each place");
         let mut voxels = self.body.voxels().clone();
         for (place, material) in self.places.iter().zip(design) {
@@ -66,12 +66,12 @@ impl Gait {
     }
 
     /// Returns the body with an expanding sensor at every place, for measuring its response.
-    pub fn probe(&self) -> Body {
+    pub(crate) fn probe(&self) -> Body {
         self.body.probe()
     }
 
     /// Returns the body with this design, but with all sensors expanding.
-    pub fn probe_of(&self, design: &[Material]) -> Body {
+    pub(crate) fn probe_of(&self, design: &[Material]) -> Body {
         let expanding = |material: &Material| match material {
             Material::Soft => Material::Soft,
             _ => Material::SensorExpand,
@@ -81,7 +81,7 @@ impl Gait {
 
     /// Returns the image under which the [`probe_of`](Gait::probe_of) a design walks as the design
     /// does under a stimulus.
-    pub fn as_probe(&self, design: &[Material], stimulus: &Grid<f64>) -> Grid<f64> {
+    pub(crate) fn as_probe(&self, design: &[Material], stimulus: &Grid<f64>) -> Grid<f64> {
         let mut image = stimulus.clone();
         for (place, material) in self.places.iter().zip(design) {
             if *material == Material::SensorShrink {
@@ -92,7 +92,7 @@ impl Gait {
     }
 
     /// Returns the target width of each place under an image \[rest widths\].
-    pub fn widths(&self, design: &[Material], stimulus: &Grid<f64>, physics: &Physics) -> Vec<f64> {
+    pub(crate) fn widths(&self, design: &[Material], stimulus: &Grid<f64>, physics: &Physics) -> Vec<f64> {
         let width = |(place, material): (&(usize, usize), &Material)| {
             width(*material, stimulus.or_default(*place), physics)
         };
@@ -109,7 +109,7 @@ fn resting(physics: &Physics) -> f64 {
 
 /// Draws an image under which each place of a probe is, independently of all others, as wide as
 /// possible (with probability 0.4), as narrow as possible (0.4), or at rest (0.2).
-pub fn random_image(height: usize, width: usize, physics: &Physics, random: &mut Stream) -> Grid<f64> {
+pub(crate) fn random_image(height: usize, width: usize, physics: &Physics, random: &mut Stream) -> Grid<f64> {
     let rest = resting(physics);
     Grid::from_fn(height, width, |_, _| {
         let drawn = random.unit();

@@ -21,20 +21,20 @@ const STARTS: usize = 6;
 
 /// An image of a design problem.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Example {
+pub(crate) struct Example {
     /// Target width of each place under it, for each of [`CHOICES`] \[rest widths\].
-    pub choices: Vec<[f64; 3]>,
+    pub(crate) choices: Vec<[f64; 3]>,
     /// Displacement with the problem's first design, measured or predicted \[voxel lengths\].
-    pub displacement: f64,
+    pub(crate) displacement: f64,
     /// Correct direction: 1 right, −1 left.
-    pub right: f64,
+    pub(crate) right: f64,
     /// Weight; the objective is the weighted mean over all examples.
-    pub weight: f64,
+    pub(crate) weight: f64,
 }
 
 impl Example {
     /// Makes an example from the stimulus of a gait.
-    pub fn new(gait: &Gait, stimulus: &Grid<f64>, physics: &Physics) -> Self {
+    pub(crate) fn new(gait: &Gait, stimulus: &Grid<f64>, physics: &Physics) -> Self {
         let widths = |place: &(usize, usize)| {
             CHOICES.map(|material| width(material, stimulus.or_default(*place), physics))
         };
@@ -47,7 +47,7 @@ impl Example {
     }
 
     /// Returns the target width of each place of a design under it \[rest widths\].
-    pub fn widths(&self, design: &[Material]) -> Vec<f64> {
+    pub(crate) fn widths(&self, design: &[Material]) -> Vec<f64> {
         self.choices.iter().zip(design).map(|(widths, material)| widths[choice(*material)]).collect()
     }
 }
@@ -60,7 +60,7 @@ fn choice(material: Material) -> usize {
 }
 
 /// A design problem: examples, first design, and slopes that predict displacements of others.
-pub struct DesignProblem {
+pub(crate) struct DesignProblem {
     /// Width by place, choice and example \[rest widths\].
     widths: Vec<[Vec<f64>; 3]>,
     slopes: Vec<f64>,
@@ -76,7 +76,7 @@ pub struct DesignProblem {
 
 impl DesignProblem {
     /// Makes a problem whose examples have the displacements of `design`.
-    pub fn new(examples: &[&Example], slopes: &[f64], design: &[Material]) -> Self {
+    pub(crate) fn new(examples: &[&Example], slopes: &[f64], design: &[Material]) -> Self {
         let column =
             |place: usize, choice: usize| examples.iter().map(|e| e.choices[place][choice]).collect();
         let total: f64 = examples.iter().map(|example| example.weight).sum();
@@ -97,7 +97,7 @@ impl DesignProblem {
     /// Makes a problem whose examples have the displacements that the model predicts for `design`:
     /// by the slopes, and by an intercept for each example. With a `side` of −1 the correct
     /// directions are reversed.
-    pub fn predicted<'a>(
+    pub(crate) fn predicted<'a>(
         examples: impl IntoIterator<Item = (&'a Example, f64)>,
         slopes: &[f64],
         design: &[Material],
@@ -120,12 +120,12 @@ impl DesignProblem {
 
     /// Returns the weighted mean [clipped margin](crate::task::fitness::clipped_margin) of the
     /// answers: from −1 to 1, the best.
-    pub fn objective(&self) -> f64 {
+    pub(crate) fn objective(&self) -> f64 {
         self.objective
     }
 
     /// Returns the current design.
-    pub fn design(&self) -> Design {
+    pub(crate) fn design(&self) -> Design {
         self.design.iter().map(|choice| CHOICES[*choice]).collect()
     }
 
@@ -152,7 +152,7 @@ impl DesignProblem {
 
     /// Climbs until no change of one place helps. At first no answer is too bad to count, so that a
     /// body that walks far to one side under every image is brought back; then margins are clipped.
-    pub fn solve(&mut self, random: &mut Stream) {
+    pub(crate) fn solve(&mut self, random: &mut Stream) {
         for floor in [f64::NEG_INFINITY, WORST] {
             self.floor = floor;
             self.count();
@@ -161,7 +161,7 @@ impl DesignProblem {
     }
 
     /// Solves from random designs, too, and keeps the best.
-    pub fn solve_from_many(&mut self, random: &mut Stream) {
+    pub(crate) fn solve_from_many(&mut self, random: &mut Stream) {
         let (displacements, design) = (self.margins.clone(), self.design.clone());
         self.solve(random);
         let mut best = (self.objective, self.margins.clone(), self.design.clone());
@@ -179,7 +179,7 @@ impl DesignProblem {
     }
 
     /// Changes up to `most` of these places, each time the one that helps most, until none helps.
-    pub fn best_changes(&mut self, places: &[usize], most: usize) {
+    pub(crate) fn best_changes(&mut self, places: &[usize], most: usize) {
         for _ in 0..most {
             let all = places.iter().flat_map(|place| CHOSEN.map(move |choice| (*place, choice)));
             let others = all.filter(|(place, choice)| *choice != self.design[*place]);

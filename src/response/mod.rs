@@ -1,9 +1,9 @@
 //! The response of a body to images: the gait, random images, the regression on them, and an
 //! estimate of what training could reach.
 
-pub mod estimate;
+pub(crate) mod estimate;
 pub mod gait;
-pub mod lesson;
-pub mod objective;
+pub(crate) mod lesson;
+pub(crate) mod objective;
 pub mod probing;
-pub mod regression;
+pub(crate) mod regression;

@@ -30,7 +30,7 @@ impl Probing {
     }
 
     /// Returns the conditions, each once, in the order of their numbers.
-    pub fn conditions(&self) -> &[Condition] {
+    pub(crate) fn conditions(&self) -> &[Condition] {
         &self.conditions
     }
 
@@ -69,6 +69,6 @@ impl Probing {
 
 /// Returns the response from the stable rollouts `shown`, out of `rollouts`; `None` if most are
 /// unstable, or too few stable.
-pub fn response(shown: &[RandomRollout], rollouts: usize) -> Option<Response> {
+pub(crate) fn response(shown: &[RandomRollout], rollouts: usize) -> Option<Response> {
     if 2 * shown.len() > rollouts { Response::of(shown) } else { None }
 }

@@ -17,7 +17,7 @@ const FOLDS: usize = 5;
 
 /// Sums over rollouts with one intercept: widths of the places, displacement, and their products.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Moments {
+pub(crate) struct Moments {
     count: f64,
     widths: DVector<f64>,
     displacement: f64,
@@ -27,7 +27,7 @@ pub struct Moments {
 
 impl Moments {
     /// Makes the sums of no rollout, for a gait with this number of places.
-    pub fn new(places: usize) -> Self {
+    pub(crate) fn new(places: usize) -> Self {
         Moments {
             count: 0.0,
             widths: DVector::zeros(places),
@@ -38,7 +38,7 @@ impl Moments {
     }
 
     /// Adds a rollout: target widths of the places, and displacement in voxel lengths.
-    pub fn add(&mut self, widths: &[f64], displacement: f64) {
+    pub(crate) fn add(&mut self, widths: &[f64], displacement: f64) {
         let widths = DVector::from_column_slice(widths);
         self.count += 1.0;
         self.displacement += displacement;
@@ -50,7 +50,7 @@ impl Moments {
     }
 
     /// Returns the mean displacement \[voxel lengths\]; 0 without rollouts.
-    pub fn mean(&self) -> f64 {
+    pub(crate) fn mean(&self) -> f64 {
         if self.count > 0.0 { self.displacement / self.count } else { 0.0 }
     }
 
@@ -65,7 +65,7 @@ impl Moments {
     }
 
     /// Returns the intercept that fits these slopes \[voxel lengths\]; `None` without rollouts.
-    pub fn intercept(&self, slopes: &[f64]) -> Option<f64> {
+    pub(crate) fn intercept(&self, slopes: &[f64]) -> Option<f64> {
         let explained: f64 = self.widths.iter().zip(slopes).map(|(width, slope)| width * slope).sum();
         (self.count > 0.0).then(|| (self.displacement - explained) / self.count)
     }
@@ -74,19 +74,19 @@ impl Moments {
 /// The data on slopes: sums over sets of rollouts, each set about its own means, so that sets may
 /// differ in their intercepts.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Evidence {
+pub(crate) struct Evidence {
     matrix: DMatrix<f64>,
     vector: DVector<f64>,
 }
 
 impl Evidence {
     /// Makes evidence of no rollout, for a gait with this number of places.
-    pub fn new(places: usize) -> Self {
+    pub(crate) fn new(places: usize) -> Self {
         Evidence { matrix: DMatrix::zeros(places, places), vector: DVector::zeros(places) }
     }
 
     /// Adds a set of rollouts with a weight.
-    pub fn add(&mut self, set: &Moments, weight: f64) {
+    pub(crate) fn add(&mut self, set: &Moments, weight: f64) {
         if set.count == 0.0 {
             return;
         }
@@ -100,13 +100,13 @@ impl Evidence {
     }
 
     /// Scales the weight of the evidence so far by a factor.
-    pub fn fade(&mut self, factor: f64) {
+    pub(crate) fn fade(&mut self, factor: f64) {
         self.matrix *= factor;
         self.vector *= factor;
     }
 
     /// Returns the slopes with the least bias: by ridge regression with the smallest penalty.
-    pub fn least_biased(&self) -> Fit {
+    pub(crate) fn least_biased(&self) -> Fit {
         let factor = self.factor(RIDGES[0]);
         Fit { slopes: factor.solve(&self.vector).as_slice().to_vec(), factor }
     }
@@ -116,7 +116,7 @@ impl Evidence {
     ///
     /// # Panics
     /// If `ridge` is not above 0.
-    pub fn slopes(&self, ridge: f64) -> (Vec<f64>, Vec<f64>) {
+    pub(crate) fn slopes(&self, ridge: f64) -> (Vec<f64>, Vec<f64>) {
         let factor = self.factor(ridge);
         let inverse = factor.inverse();
         let errors = (0..self.vector.len()).map(|i| inverse[(i, i)].sqrt()).collect();
@@ -124,7 +124,7 @@ impl Evidence {
     }
 
     /// Embeds the evidence in more places: its n-th place gets the n-th of these numbers.
-    pub fn among(&self, numbers: &[usize], places: usize) -> Self {
+    pub(crate) fn among(&self, numbers: &[usize], places: usize) -> Self {
         let mut all = Evidence::new(places);
         for (i, &row) in numbers.iter().enumerate() {
             all.vector[row] = self.vector[i];
@@ -139,7 +139,7 @@ impl Evidence {
     ///
     /// # Panics
     /// If `ridge` is not above 0.
-    pub fn slopes_alone(&self, ridge: f64) -> Vec<f64> {
+    pub(crate) fn slopes_alone(&self, ridge: f64) -> Vec<f64> {
         self.factor(ridge).solve(&self.vector).as_slice().to_vec()
     }
 
@@ -152,9 +152,9 @@ impl Evidence {
 }
 
 /// Slopes, and their variance over other rollouts.
-pub struct Fit {
+pub(crate) struct Fit {
     /// The slopes, in the places' order \[voxel lengths\].
-    pub slopes: Vec<f64>,
+    pub(crate) slopes: Vec<f64>,
     factor: nalgebra::Cholesky<f64, nalgebra::Dyn>,
 }
 
@@ -162,7 +162,7 @@ impl Fit {
     /// Returns the expected squared error of the weighted sum of the slopes, and its part due to
     /// noise, not bias; both in units of a rollout's squared scatter. Assumes that true slopes vary
     /// as `ridge`, the chosen penalty, implies.
-    pub fn variance(&self, weights: &[f64], ridge: f64) -> (f64, f64) {
+    pub(crate) fn variance(&self, weights: &[f64], ridge: f64) -> (f64, f64) {
         let weights = DVector::from_column_slice(weights);
         let solved = self.factor.solve(&weights);
         let held_back = RIDGES[0] * solved.dot(&solved);
@@ -173,28 +173,28 @@ impl Fit {
 
 /// The response of a gait, from rollouts with random images.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Response {
+pub(crate) struct Response {
     /// Displacement of the body to the right for each place that is wider by one rest width \[voxel
     /// lengths\], in the places' order.
-    pub slopes: Vec<f64>,
+    pub(crate) slopes: Vec<f64>,
     /// Standard errors of the slopes, including the shrinkage by the penalty \[voxel lengths\].
-    pub errors: Vec<f64>,
+    pub(crate) errors: Vec<f64>,
     /// Displacement of a body with all places of width 0, mean over conditions \[voxel lengths\].
-    pub intercept: f64,
+    pub(crate) intercept: f64,
     /// Intercept under each condition; none without rollouts.
-    pub intercepts: Vec<Option<f64>>,
+    pub(crate) intercepts: Vec<Option<f64>>,
     /// Standard deviation of displacements about predictions from slopes of other rollouts,
     /// cross-validated \[voxel lengths\].
-    pub noise: f64,
+    pub(crate) noise: f64,
     /// Standard deviation of displacements about predictions from the true slopes: `noise` without
     /// the slopes' errors \[voxel lengths\].
-    pub scatter: f64,
+    pub(crate) scatter: f64,
     /// Fraction of the displacements' variance that slopes fitted to other rollouts explain.
-    pub r_squared: f64,
+    pub(crate) r_squared: f64,
     /// The chosen penalty.
-    pub ridge: f64,
+    pub(crate) ridge: f64,
     /// Data of the fit.
-    pub evidence: Evidence,
+    pub(crate) evidence: Evidence,
 }
 
 /// A rollout under a random image.
@@ -211,7 +211,7 @@ pub struct RandomRollout {
 impl Response {
     /// Fits slopes with the penalty that predicts left-out rollouts best. Returns `None` for fewer
     /// than two rollouts per fold.
-    pub fn of(rollouts: &[RandomRollout]) -> Option<Self> {
+    pub(crate) fn of(rollouts: &[RandomRollout]) -> Option<Self> {
         let places = rollouts.first()?.widths.len();
         if rollouts.len() < 2 * FOLDS {
             return None;
@@ -281,7 +281,7 @@ impl Response {
     /// known. Each place has the weight of its width's variation, so this is the relative error of
     /// the displacements predicted for random images. Its square is the share of the variance that
     /// exact slopes would explain and these do not.
-    pub fn relative_error(&self) -> f64 {
+    pub(crate) fn relative_error(&self) -> f64 {
         let weighed = |numbers: &[f64]| -> f64 {
             numbers
                 .iter()

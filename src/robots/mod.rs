@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// As [`StoredRun::read`].
-pub fn open(path: &Path) -> Result<StoredRun, Error> {
+pub(crate) fn open(path: &Path) -> Result<StoredRun, Error> {
     match path == published::archive() {
         true => Ok(StoredRun { path: path.to_path_buf(), run: published::run()? }),
         false => StoredRun::read(path),
@@ -25,7 +25,7 @@ pub fn open(path: &Path) -> Result<StoredRun, Error> {
 ///
 /// # Errors
 /// Returns an error if there is no run.
-pub fn archives(named: Vec<PathBuf>, robots: Selection) -> Result<(Vec<PathBuf>, Selection), Error> {
+pub(crate) fn archives(named: Vec<PathBuf>, robots: Selection) -> Result<(Vec<PathBuf>, Selection), Error> {
     if !named.is_empty() {
         return Ok((named, robots));
     }

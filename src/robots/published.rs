@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 const CONFIG: &str = "zero_one_published.toml";
 
 /// Name of the set of all published robots.
-pub const ALL: &str = "gallery";
+pub(crate) const ALL: &str = "gallery";
 
 pub(crate) const TEXT: &str = include_str!("../../data/gallery.json");
 
@@ -53,7 +53,7 @@ pub struct Published {
 
 impl Published {
     /// Returns the classes that its two directions stand for.
-    pub fn judge(&self) -> Readout {
+    pub(crate) fn judge(&self) -> Readout {
         let says = |way| if way == self.zero_walks { vec![0] } else { vec![1] };
         Readout { left: says(Direction::Left), right: says(Direction::Right) }
     }
@@ -102,7 +102,7 @@ pub fn config() -> Result<Config, Error> {
 ///
 /// # Errors
 /// As [`gallery`]; also if only some of the names are published.
-pub fn is_meant(selection: &Selection) -> Result<bool, Error> {
+pub(crate) fn is_meant(selection: &Selection) -> Result<bool, Error> {
     let Selection::Ids(ids) = selection else { return Ok(false) };
     if matches!(ids.as_slice(), [word] if word == ALL) {
         return Ok(true);
@@ -119,7 +119,7 @@ pub fn is_meant(selection: &Selection) -> Result<bool, Error> {
 }
 
 /// Describes the origin of robots: the name and seed of their run, or that they were published.
-pub fn provenance(run: &str, seed: u64) -> String {
+pub(crate) fn provenance(run: &str, seed: u64) -> String {
     match run == ALL {
         true => "published with the paper".to_string(),
         false => format!("{run}, seed {seed}"),

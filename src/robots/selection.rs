@@ -13,15 +13,15 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 /// The word for the best robot.
-pub const BEST: &str = "best";
+pub(crate) const BEST: &str = "best";
 
 /// A robot and the index of its run.
 #[derive(Clone, Copy, Debug)]
-pub struct Chosen<'a> {
+pub(crate) struct Chosen<'a> {
     /// Index of its run.
-    pub source: usize,
+    pub(crate) source: usize,
     /// The robot.
-    pub robot: &'a Robot,
+    pub(crate) robot: &'a Robot,
 }
 
 /// A selection of robots from one run, or from several together.
@@ -78,7 +78,7 @@ impl FromStr for Selection {
 impl Selection {
     /// Restricts the selection to robots that audits found physical, if `only` is true.
     #[must_use]
-    pub fn physical(self, only: bool) -> Self {
+    pub(crate) fn physical(self, only: bool) -> Self {
         if only { Selection::Physical(Box::new(self)) } else { self }
     }
 
@@ -92,7 +92,7 @@ impl Selection {
     }
 
     /// Describes the selection to the user.
-    pub fn describe(&self) -> String {
+    pub(crate) fn describe(&self) -> String {
         match self {
             Selection::All => "all elites".to_string(),
             Selection::Top(1) => "the fittest of each task on the training images".to_string(),
@@ -116,7 +116,7 @@ impl Selection {
     /// # Errors
     /// Returns an error if an id matches no robot or several, or if physical ones are selected and
     /// the audits are incomplete.
-    pub fn of<'a>(&self, sources: &'a [StoredRun], seed: u64) -> Result<Vec<Chosen<'a>>, Error> {
+    pub(crate) fn of<'a>(&self, sources: &'a [StoredRun], seed: u64) -> Result<Vec<Chosen<'a>>, Error> {
         let robots = |(source, from): (usize, &'a StoredRun)| {
             from.run.elites.iter().map(move |robot| Chosen { source, robot })
         };
@@ -135,7 +135,7 @@ impl Selection {
     ///
     /// # Errors
     /// As [`Selection::of`].
-    pub fn of_each(&self, sources: &[StoredRun], seed: u64) -> Result<Vec<Option<Selection>>, Error> {
+    pub(crate) fn of_each(&self, sources: &[StoredRun], seed: u64) -> Result<Vec<Option<Selection>>, Error> {
         if sources.len() < 2 || self.validated().is_some() {
             return Ok(vec![Some(self.clone()); sources.len()]);
         }

@@ -33,18 +33,18 @@ pub(crate) fn task_of<'a>(grouping: &'a Grouping, robot: &Robot) -> Option<&'a g
 }
 
 pub(crate) struct HeldOutRun<'a> {
-    pub config: &'a Config,
+    pub(crate) config: &'a Config,
     /// Control steps per image.
-    pub control_steps: u32,
+    pub(crate) control_steps: u32,
     pool: &'a rayon::ThreadPool,
-    pub session: &'a Session<'a>,
+    pub(crate) session: &'a Session<'a>,
     /// Rollouts so far.
     done: AtomicU64,
 }
 
 impl<'a> HeldOutRun<'a> {
     /// Evaluates robots of a config for this many control steps per image, after `done` rollouts.
-    pub fn new(
+    pub(crate) fn new(
         config: &'a Config,
         control_steps: u32,
         done: u64,
@@ -55,7 +55,7 @@ impl<'a> HeldOutRun<'a> {
     }
 
     /// Announces a validation. `images` counts those of the best robots, `showings` all rollouts.
-    pub fn validating(&self, robots: usize, images: usize, showings: u64) {
+    pub(crate) fn validating(&self, robots: usize, images: usize, showings: u64) {
         let label = format!(
             "validating {} on up to {}:",
             counted(robots, "robot", "robots"),
@@ -67,7 +67,7 @@ impl<'a> HeldOutRun<'a> {
     /// Returns the displacement under each image (`None`: unstable) and the number of rollouts.
     /// Images with the same pixels at the sensors share a rollout. Returns `None` if it was
     /// stopped.
-    pub fn rollouts(&self, robot: &Robot, stimuli: &[Grid<f64>]) -> Option<(Vec<Option<f64>>, usize)> {
+    pub(crate) fn rollouts(&self, robot: &Robot, stimuli: &[Grid<f64>]) -> Option<(Vec<Option<f64>>, usize)> {
         let HeldOutRun { config, session, done, .. } = self;
         let protocol = Protocol {
             rollout: RolloutMode::Fresh,
@@ -89,11 +89,11 @@ impl<'a> HeldOutRun<'a> {
 
 /// The evaluation of one robot on images.
 pub(crate) struct Trial<'a> {
-    pub run: &'a RunFile,
-    pub robot: &'a Robot,
-    pub split: &'a ClassSplit,
-    pub images: &'a [ImageRef],
-    pub threshold: f64,
+    pub(crate) run: &'a RunFile,
+    pub(crate) robot: &'a Robot,
+    pub(crate) split: &'a ClassSplit,
+    pub(crate) images: &'a [ImageRef],
+    pub(crate) threshold: f64,
 }
 
 impl RobotReport {

@@ -1,7 +1,7 @@
 //! The evolution of bodies, resuming it, and the choice of robots on validation images.
 
-pub mod evolve;
+pub(crate) mod evolve;
 pub mod held_out_run;
 pub mod one_by_one;
-pub mod resume;
-pub mod validation;
+pub(crate) mod resume;
+pub(crate) mod validation;

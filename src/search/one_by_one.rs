@@ -29,7 +29,7 @@ pub struct RobotChoice {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Named {
     /// Its archive.
-    pub archive: PathBuf,
+    pub(crate) archive: PathBuf,
     /// Its id, the beginning of one, or "best".
     pub robot: String,
 }

@@ -49,22 +49,22 @@ const ROUNDS: [Round; 3] = [
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wanted {
     /// Number of robots of each task.
-    pub count: usize,
+    pub(crate) count: usize,
     /// Number of images in total.
-    pub images: usize,
+    pub(crate) images: usize,
     /// Command-line argument that set `images`; `None` if the config did.
-    pub argument: Option<&'static str>,
+    pub(crate) argument: Option<&'static str>,
     /// Threshold up to which displacements count as wrong \[voxel lengths\].
-    pub threshold: f64,
+    pub(crate) threshold: f64,
 }
 
 /// The run to choose from, and the number of robots.
 #[derive(Clone, Debug)]
-pub struct ValidationOptions {
+pub(crate) struct ValidationOptions {
     /// Path of the run.json.
-    pub archive: PathBuf,
+    pub(crate) archive: PathBuf,
     /// Number of robots of each task; `None`: that of the config.
-    pub best: Option<usize>,
+    pub(crate) best: Option<usize>,
 }
 
 /// Chooses the best robots of a run on its `[validation]` images, evaluated as by `eval`, and keeps
@@ -72,7 +72,10 @@ pub struct ValidationOptions {
 ///
 /// # Errors
 /// Returns an error if run or data is unsuitable, or if there are not enough images.
-pub fn validate(options: &ValidationOptions, session: &Session) -> Result<Option<Vec<Validated>>, Error> {
+pub(crate) fn validate(
+    options: &ValidationOptions,
+    session: &Session,
+) -> Result<Option<Vec<Validated>>, Error> {
     let source = StoredRun::read(&options.archive)?;
     let config = &source.run.config;
     let count = options.best.unwrap_or(config.validation.best);

@@ -6,7 +6,7 @@ const JS: &str = "text/javascript; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";
 
 /// Returns the file at a path.
-pub fn asset(path: &str) -> Option<HttpResponse> {
+pub(crate) fn asset(path: &str) -> Option<HttpResponse> {
     let (content_type, text) = match path {
         "/" => ("text/html; charset=utf-8", include_str!("page/page.html")),
         "/icon.svg" => ("image/svg+xml", include_str!("page/icon.svg")),

@@ -24,99 +24,99 @@ use std::time::{Duration, Instant, SystemTime};
 
 /// Robots from one source. They share a world; robots that ship together may have different
 /// windows.
-pub struct Collection {
+pub(crate) struct Collection {
     /// The name on the page.
-    pub name: String,
+    pub(crate) name: String,
     /// The path of the run.json; `None` if it is built in.
-    pub path: Option<PathBuf>,
+    pub(crate) path: Option<PathBuf>,
     /// The configuration of the run, except each robot's stimulus.
-    pub config: Config,
+    pub(crate) config: Config,
     /// The dataset of the run; `None` for published robots.
-    pub dataset: Option<DatasetRef>,
+    pub(crate) dataset: Option<DatasetRef>,
     /// The number of generations completed.
-    pub generations: Option<u64>,
+    pub(crate) generations: Option<u64>,
     /// The bins of the archive's dimensions muscle, sensor and total.
-    pub bins: Vec<usize>,
+    pub(crate) bins: Vec<usize>,
     /// The names of the tasks.
-    pub tasks: Vec<String>,
+    pub(crate) tasks: Vec<String>,
     /// The robots, fittest first.
-    pub robots: Vec<Entry>,
+    pub(crate) robots: Vec<Entry>,
     /// Robots that have left the archive, most recent first: a page may still list them.
-    pub gone: Vec<Entry>,
+    pub(crate) gone: Vec<Entry>,
 }
 
 /// A robot that the page can simulate.
 #[derive(Clone, Debug, Serialize)]
-pub struct Entry {
+pub(crate) struct Entry {
     /// The id or name.
-    pub id: String,
+    pub(crate) id: String,
     /// The task, such as "0|123".
-    pub task: String,
+    pub(crate) task: String,
     /// The fitness on the training images, as measured by its run.
-    pub fitness: f64,
+    pub(crate) fitness: f64,
     /// The voxel counts by kind.
-    pub voxels: VoxelCounts,
+    pub(crate) voxels: VoxelCounts,
     /// The cell in the archive; empty for a published robot.
-    pub cell: Vec<usize>,
+    pub(crate) cell: Vec<usize>,
     /// The generation in which it was born.
-    pub generation: Option<u64>,
+    pub(crate) generation: Option<u64>,
     /// The parameters of its stimulus.
-    pub encoding: StimulusParams,
+    pub(crate) encoding: StimulusParams,
     /// The judge of its walks; `None` if all classes walk the same way.
-    pub judge: Option<Readout>,
+    pub(crate) judge: Option<Readout>,
     /// The result of an audit, if one is beside the archive.
-    pub audit: Option<Audited>,
+    pub(crate) audit: Option<Audited>,
     /// The body.
-    pub body: Body,
+    pub(crate) body: Body,
 }
 
 /// A body with everything that its simulation depends on.
 #[derive(Clone, Debug)]
-pub struct Who {
+pub(crate) struct Who {
     /// The body.
-    pub body: Body,
+    pub(crate) body: Body,
     /// The constants of its world.
-    pub physics: Physics,
+    pub(crate) physics: Physics,
     /// Its start, and the duration of an image.
-    pub protocol: Protocol,
+    pub(crate) protocol: Protocol,
     /// The parameters of its stimulus.
-    pub encoding: StimulusParams,
+    pub(crate) encoding: StimulusParams,
     /// The judge of its walks; `None` for a body without a task.
-    pub judge: Option<Readout>,
+    pub(crate) judge: Option<Readout>,
 }
 
 /// The result of an audit.
 #[derive(Clone, Debug, Serialize)]
-pub struct Audited {
+pub(crate) struct Audited {
     /// The verdict in a word or two.
-    pub verdict: &'static str,
+    pub(crate) verdict: &'static str,
     /// The verdict with its reason.
-    pub conclusion: String,
+    pub(crate) conclusion: String,
 }
 
 /// A collection without its robots, for the list of collections.
 #[derive(Clone, Debug, Serialize)]
-pub struct CollectionSummary {
+pub(crate) struct CollectionSummary {
     /// The number of the collection, from 0.
-    pub index: usize,
+    pub(crate) index: usize,
     /// The name on the page.
-    pub name: String,
+    pub(crate) name: String,
     /// The path of the run.json; `None` if it is built in.
-    pub path: Option<String>,
+    pub(crate) path: Option<String>,
     /// The number of robots.
-    pub robots: usize,
+    pub(crate) robots: usize,
     /// The names of the tasks.
-    pub tasks: Vec<String>,
+    pub(crate) tasks: Vec<String>,
     /// The dataset on which the robots evolved.
-    pub dataset: String,
+    pub(crate) dataset: String,
     /// The number of generations completed.
-    pub generations: Option<u64>,
+    pub(crate) generations: Option<u64>,
     /// The number of generations requested.
-    pub asked: Option<u64>,
+    pub(crate) asked: Option<u64>,
     /// The number of changes since the archive was first read.
-    pub changes: u64,
+    pub(crate) changes: u64,
     /// The largest fitness.
-    pub best: Option<f64>,
+    pub(crate) best: Option<f64>,
 }
 
 /// An archive whose files are polled for changes.
@@ -158,7 +158,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(500);
 
 /// All collections: the built-in ones first, led by the trained robots, then archives. Archives are
 /// reloaded when they change, and runs that begin or continue meanwhile are added.
-pub struct RobotCatalogue {
+pub(crate) struct RobotCatalogue {
     built_in: Vec<Arc<Collection>>,
     /// The archives as of the last poll; locked only to copy or replace the list.
     known: Mutex<Arc<[Known]>>,
@@ -186,7 +186,7 @@ impl RobotCatalogue {
     ///
     /// # Errors
     /// Returns an error if an archive is invalid.
-    pub fn open(
+    pub(crate) fn open(
         archives: &[PathBuf],
         newest: Option<&Path>,
         runs: &Path,
@@ -231,7 +231,7 @@ impl RobotCatalogue {
     }
 
     /// Summarises all collections.
-    pub fn list(&self) -> Vec<CollectionSummary> {
+    pub(crate) fn list(&self) -> Vec<CollectionSummary> {
         let short = |(from, asked, changes): (&Collection, Option<u64>, u64)| CollectionSummary {
             index: 0,
             name: from.name.clone(),
@@ -254,7 +254,7 @@ impl RobotCatalogue {
     }
 
     /// Returns all collections.
-    pub fn collections(&self) -> Vec<Arc<Collection>> {
+    pub(crate) fn collections(&self) -> Vec<Arc<Collection>> {
         let archives = self.archives();
         self.built_in.iter().chain(archives.iter().map(|known| &known.collection)).cloned().collect()
     }
@@ -263,7 +263,7 @@ impl RobotCatalogue {
     ///
     /// # Errors
     /// Returns an error if there is no such collection.
-    pub fn collection(&self, index: usize) -> Result<Arc<Collection>, HttpRefusal> {
+    pub(crate) fn collection(&self, index: usize) -> Result<Arc<Collection>, HttpRefusal> {
         let collections = self.collections();
         let unknown =
             || HttpRefusal::Unknown(format!("there is no archive {index}: there are {}", collections.len()));
@@ -274,7 +274,7 @@ impl RobotCatalogue {
     ///
     /// # Errors
     /// Returns an error if there is no such run, or its `metrics.csv` cannot be read.
-    pub fn course(&self, index: usize) -> Result<Course, HttpRefusal> {
+    pub(crate) fn course(&self, index: usize) -> Result<Course, HttpRefusal> {
         let collection = self.collection(index)?;
         let Some(path) = &collection.path else {
             return Err(HttpRefusal::Unknown(format!("{}: it is no run", collection.name)));
@@ -371,7 +371,7 @@ impl Collection {
     ///
     /// # Errors
     /// Returns an error if there is no such robot.
-    pub fn robot(&self, id: &str) -> Result<&Entry, HttpRefusal> {
+    pub(crate) fn robot(&self, id: &str) -> Result<&Entry, HttpRefusal> {
         let found = self.robots.iter().chain(&self.gone).find(|robot| robot.id == id);
         found.ok_or_else(|| HttpRefusal::Unknown(format!("{}: there is no robot {id:?}", self.name)))
     }
@@ -380,7 +380,7 @@ impl Collection {
     ///
     /// # Errors
     /// Returns an error if there is no such robot.
-    pub fn who(&self, id: &str) -> Result<Who, HttpRefusal> {
+    pub(crate) fn who(&self, id: &str) -> Result<Who, HttpRefusal> {
         let (robot, config) = (self.robot(id)?, &self.config);
         Ok(Who {
             body: robot.body.clone(),

@@ -10,23 +10,23 @@ use std::path::Path;
 
 /// The metrics of a run so far: `metrics.csv`, thinned.
 #[derive(Clone, Debug, Serialize)]
-pub struct Course {
+pub(crate) struct Course {
     /// The number of generations completed.
-    pub done: usize,
+    pub(crate) done: usize,
     /// The number of generations requested.
-    pub asked: u64,
+    pub(crate) asked: u64,
     /// True if a process is working on the run.
-    pub under_way: bool,
+    pub(crate) under_way: bool,
     /// The estimated seconds for the rest, at the pace of the last fifth.
-    pub seconds_left: Option<f64>,
+    pub(crate) seconds_left: Option<f64>,
     /// The generations of the curves' points.
-    pub generation: Vec<usize>,
+    pub(crate) generation: Vec<usize>,
     /// The QD score.
-    pub qd_score: Vec<f64>,
+    pub(crate) qd_score: Vec<f64>,
     /// The share of cells that are filled.
-    pub coverage: Vec<f64>,
+    pub(crate) coverage: Vec<f64>,
     /// The largest fitness; `None` before the first elite.
-    pub obj_max: Vec<Option<f64>>,
+    pub(crate) obj_max: Vec<Option<f64>>,
 }
 
 /// Maximum number of points of a curve: the page has no pixels for more.
@@ -37,7 +37,7 @@ impl Course {
     ///
     /// # Errors
     /// Returns an error if its `metrics.csv` exists and cannot be read.
-    pub fn of(archive: &Path, asked: u64) -> Result<Self, Error> {
+    pub(crate) fn of(archive: &Path, asked: u64) -> Result<Self, Error> {
         // Runs of the gallery and the atlas lack this file, as do runs that just began.
         let moments = if exists(&archive.with_file_name(METRICS)) { moments(archive)? } else { Vec::new() };
         let done = moments.len();

@@ -15,7 +15,7 @@ pub struct Hosts {
 
 /// The name or address of a host, without a port, in lower case.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct HostName(String);
+pub(crate) struct HostName(String);
 
 impl FromStr for HostName {
     type Err = String;
@@ -53,7 +53,7 @@ fn host_of(header: &str) -> Option<HostName> {
 
 impl Hosts {
     /// Allows this machine's names and `allowed`; `advice` tells how to allow another one.
-    pub fn new(allowed: Vec<HostName>, advice: &'static str) -> Self {
+    pub(crate) fn new(allowed: Vec<HostName>, advice: &'static str) -> Self {
         Hosts { allowed, advice }
     }
 
@@ -62,7 +62,7 @@ impl Hosts {
     ///
     /// # Errors
     /// Returns the refusal to send.
-    pub fn check(&self, request: &Request) -> Result<(), HttpResponse> {
+    pub(crate) fn check(&self, request: &Request) -> Result<(), HttpResponse> {
         let Some(host) = request.header("host")? else {
             return Err(HttpResponse::refusal(400, "expected a Host header"));
         };

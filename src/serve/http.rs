@@ -12,7 +12,7 @@ const MAX_HEAD: usize = 16 * 1024;
 /// Maximum number of headers.
 const MAX_HEADERS: usize = 64;
 /// The longest body of a request \[bytes\]; a body and a stimulus of 64 × 64 fit.
-pub const MAX_BODY: usize = 256 * 1024;
+pub(crate) const MAX_BODY: usize = 256 * 1024;
 /// Time limit for a request to arrive.
 const TO_READ: Duration = Duration::from_secs(10);
 /// Time limit for the reader to take what is written.
@@ -20,17 +20,17 @@ const TO_WRITE: Duration = Duration::from_secs(20);
 
 /// An HTTP request.
 #[derive(Debug, PartialEq, Eq)]
-pub struct Request {
+pub(crate) struct Request {
     /// The method, such as "GET".
-    pub method: String,
+    pub(crate) method: String,
     /// The path without the query.
-    pub path: String,
+    pub(crate) path: String,
     /// The query: the text after the question mark.
-    pub query: String,
+    pub(crate) query: String,
     /// Names in lower case.
     headers: Vec<(String, String)>,
     /// The body.
-    pub body: Vec<u8>,
+    pub(crate) body: Vec<u8>,
 }
 
 impl Request {
@@ -39,7 +39,7 @@ impl Request {
     /// # Errors
     /// Returns a refusal if it occurs more than once: one might pass the check and another take
     /// effect.
-    pub fn header(&self, name: &str) -> Result<Option<&str>, HttpResponse> {
+    pub(crate) fn header(&self, name: &str) -> Result<Option<&str>, HttpResponse> {
         let mut found = self.headers.iter().filter(|(own, _)| own == name);
         let first = found.next().map(|(_, value)| value.as_str());
         match found.next() {
@@ -49,7 +49,7 @@ impl Request {
     }
 
     /// Returns a value of the query, undecoded.
-    pub fn asked(&self, key: &str) -> Option<&str> {
+    pub(crate) fn asked(&self, key: &str) -> Option<&str> {
         let pairs = self.query.split('&').filter_map(|pair| pair.split_once('='));
         pairs.into_iter().find(|(own, _)| *own == key).map(|(_, value)| value)
     }
@@ -57,7 +57,7 @@ impl Request {
 
 /// A complete response, sent at once.
 #[derive(Debug)]
-pub struct HttpResponse {
+pub(crate) struct HttpResponse {
     status: u16,
     content_type: &'static str,
     body: Vec<u8>,
@@ -67,12 +67,12 @@ pub struct HttpResponse {
 
 impl HttpResponse {
     /// Creates the response for an embedded file.
-    pub fn file(content_type: &'static str, text: &str) -> Self {
+    pub(crate) fn file(content_type: &'static str, text: &str) -> Self {
         HttpResponse { status: 200, content_type, body: text.as_bytes().to_vec(), allow: None }
     }
 
     /// Creates a JSON response.
-    pub fn json(value: &impl Serialize) -> Self {
+    pub(crate) fn json(value: &impl Serialize) -> Self {
         match serde_json::to_vec(value) {
             Ok(body) => HttpResponse { status: 200, content_type: "application/json", body, allow: None },
             Err(error) => HttpResponse::refusal(500, &error.to_string()),
@@ -80,18 +80,18 @@ impl HttpResponse {
     }
 
     /// Creates a response without content.
-    pub fn done() -> Self {
+    pub(crate) fn done() -> Self {
         HttpResponse { status: 204, content_type: "text/plain; charset=utf-8", body: Vec::new(), allow: None }
     }
 
     /// Creates an error response of one line.
-    pub fn refusal(status: u16, line: &str) -> Self {
+    pub(crate) fn refusal(status: u16, line: &str) -> Self {
         let body = format!("{}\n", one_line(line)).into_bytes();
         HttpResponse { status, content_type: "text/plain; charset=utf-8", body, allow: None }
     }
 
     /// Creates the response to a request with a wrong method.
-    pub fn wrong_method(allow: &'static str) -> Self {
+    pub(crate) fn wrong_method(allow: &'static str) -> Self {
         HttpResponse { allow: Some(allow), ..HttpResponse::refusal(405, &format!("expected {allow}")) }
     }
 
@@ -99,7 +99,7 @@ impl HttpResponse {
     ///
     /// # Errors
     /// Returns an error if the reader has gone.
-    pub fn send(&self, stream: &mut TcpStream, head_only: bool) -> io::Result<()> {
+    pub(crate) fn send(&self, stream: &mut TcpStream, head_only: bool) -> io::Result<()> {
         let allow = self.allow.map_or(String::new(), |methods| format!("Allow: {methods}\r\n"));
         let length = format!("Content-Length: {}\r\n", self.body.len());
         let length = if self.status == 204 { "" } else { &length };
@@ -142,7 +142,7 @@ fn head(status: u16, content_type: &str, more: &str) -> String {
 ///
 /// # Errors
 /// Returns an error if the reader has gone.
-pub fn begin_events(stream: &mut TcpStream) -> io::Result<()> {
+pub(crate) fn begin_events(stream: &mut TcpStream) -> io::Result<()> {
     stream.set_nodelay(true)?;
     // Keeps proxies from buffering events.
     stream.write_all(head(200, "text/event-stream", "X-Accel-Buffering: no\r\n").as_bytes())
@@ -152,7 +152,7 @@ pub fn begin_events(stream: &mut TcpStream) -> io::Result<()> {
 ///
 /// # Errors
 /// Returns the refusal to send if the data are no valid request.
-pub fn read(stream: &mut TcpStream) -> Result<Option<Request>, HttpResponse> {
+pub(crate) fn read(stream: &mut TcpStream) -> Result<Option<Request>, HttpResponse> {
     let broken =
         |error: &io::Error| HttpResponse::refusal(400, &format!("the request cannot be read: {error}"));
     let deadline = Instant::now() + TO_READ;
@@ -247,7 +247,7 @@ fn length(request: &Request) -> Result<usize, HttpResponse> {
 }
 
 /// Closes a connection so that sent data arrive: closing with unread bytes would discard them.
-pub fn close(stream: &mut TcpStream) {
+pub(crate) fn close(stream: &mut TcpStream) {
     let _ = stream.shutdown(Shutdown::Write);
     let until = Instant::now() + Duration::from_millis(500);
     let mut rest = Vec::new();

@@ -11,40 +11,40 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Maximum number of images in one response.
-pub const MAX_PAGE: usize = 60;
+pub(crate) const MAX_PAGE: usize = 60;
 
 /// The identifier of an image.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-pub struct ImageName {
+pub(crate) struct ImageName {
     /// The name of its set.
-    pub set: String,
+    pub(crate) set: String,
     /// The index among the test images.
-    pub index: usize,
+    pub(crate) index: usize,
 }
 
 /// A test image with its class and pixels.
 #[derive(Clone, Debug, Serialize)]
-pub struct TestImage {
+pub(crate) struct TestImage {
     /// The index among the test images.
-    pub index: usize,
+    pub(crate) index: usize,
     /// The class.
-    pub label: u8,
+    pub(crate) label: u8,
     /// The pixels, 0 paper … 255 ink, rows from the top.
-    pub pixels: Grid<u8>,
+    pub(crate) pixels: Grid<u8>,
 }
 
 /// The contents of a set.
 #[derive(Clone, Debug, Serialize)]
-pub struct SetSummary {
+pub(crate) struct SetSummary {
     /// The name of the set.
-    pub name: String,
+    pub(crate) name: String,
     /// The number of test images by class.
-    pub classes: Vec<(u8, usize)>,
+    pub(crate) classes: Vec<(u8, usize)>,
 }
 
 /// The test images that the page offers.
-pub struct ImageSets {
+pub(crate) struct ImageSets {
     sets: Vec<Dataset>,
 }
 
@@ -53,7 +53,10 @@ impl ImageSets {
     ///
     /// # Errors
     /// Returns an error if the built-in digits cannot be made (which does not happen).
-    pub fn open(catalogue: &RobotCatalogue, data: Option<&Path>) -> Result<(Self, Vec<String>), Error> {
+    pub(crate) fn open(
+        catalogue: &RobotCatalogue,
+        data: Option<&Path>,
+    ) -> Result<(Self, Vec<String>), Error> {
         let refuse = |error: crate::data::dataset::DatasetError| Error::input(error.to_string());
         let mut sets = Vec::new();
         // Each with the name of its set.
@@ -92,7 +95,7 @@ impl ImageSets {
     }
 
     /// Summarises all sets.
-    pub fn list(&self) -> Vec<SetSummary> {
+    pub(crate) fn list(&self) -> Vec<SetSummary> {
         let classes = |set: &Dataset| {
             let classes = set.classes(Split::Test).into_iter();
             classes.map(|class| (class, set.indices_of(Split::Test, class).len())).collect()
@@ -112,7 +115,7 @@ impl ImageSets {
     ///
     /// # Errors
     /// Returns an error if there is no such set.
-    pub fn page(
+    pub(crate) fn page(
         &self,
         set: &str,
         class: u8,
@@ -134,7 +137,7 @@ impl ImageSets {
     ///
     /// # Errors
     /// Returns an error if there is no such image.
-    pub fn image(&self, name: &ImageName) -> Result<TestImage, HttpRefusal> {
+    pub(crate) fn image(&self, name: &ImageName) -> Result<TestImage, HttpRefusal> {
         let unknown = |error: crate::data::dataset::DatasetError| HttpRefusal::Unknown(error.to_string());
         let (set, index) = (self.set(&name.set)?, name.index);
         let label = set.label(Split::Test, index).map_err(unknown)?;

@@ -1,20 +1,20 @@
 //! `morphcog serve`: answers the page's requests with the real engine. Only [`server`] and its
 //! helpers know HTTP.
 
-pub mod assets;
-pub mod catalogue;
-pub mod course;
-pub mod hosts;
-pub mod http;
-pub mod images;
-pub mod refusal;
-pub mod request;
-pub mod routes;
+pub(crate) mod assets;
+pub(crate) mod catalogue;
+pub(crate) mod course;
+pub(crate) mod hosts;
+pub(crate) mod http;
+pub(crate) mod images;
+pub(crate) mod refusal;
+pub(crate) mod request;
+pub(crate) mod routes;
 pub mod server;
-pub mod simulation;
+pub(crate) mod simulation;
 pub mod simulations;
-pub mod stream;
-pub mod team;
+pub(crate) mod stream;
+pub(crate) mod team;
 
 use crate::base::error::Error;
 use crate::base::threads;
@@ -49,58 +49,58 @@ pub struct ServeOptions {
 /// Everything that a page can request.
 pub struct Service {
     /// The robots to choose from.
-    pub catalogue: RobotCatalogue,
+    pub(crate) catalogue: RobotCatalogue,
     /// The test images to choose from.
-    pub images: ImageSets,
+    pub(crate) images: ImageSets,
     /// The simulations that are running.
-    pub simulations: Simulations,
+    pub(crate) simulations: Simulations,
     /// The threads in which the robots of teams walk.
-    pub pool: rayon::ThreadPool,
+    pub(crate) pool: rayon::ThreadPool,
     /// The names under which the page may be reached.
-    pub hosts: Hosts,
+    pub(crate) hosts: Hosts,
 }
 
 /// The response to `/api/status`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct ServiceStatus {
+pub(crate) struct ServiceStatus {
     /// The version of the program.
-    pub version: &'static str,
+    pub(crate) version: &'static str,
     /// The number of simulations running now.
-    pub simulations: usize,
+    pub(crate) simulations: usize,
     /// The maximum number of simulations at once.
-    pub max_simulations: usize,
+    pub(crate) max_simulations: usize,
     /// The number of simulations begun so far.
-    pub begun: u64,
+    pub(crate) begun: u64,
 }
 
 /// The result of checking a body.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Checked {
+pub(crate) struct Checked {
     /// True if there is a voxel and all voxels are connected.
-    pub connected: bool,
+    pub(crate) connected: bool,
     /// The number of muscle voxels.
-    pub muscle: usize,
+    pub(crate) muscle: usize,
     /// The number of sensor voxels.
-    pub sensor: usize,
+    pub(crate) sensor: usize,
     /// The number of all voxels.
-    pub total: usize,
+    pub(crate) total: usize,
     /// The reason why it is not viable; `None` if it is.
-    pub problem: Option<&'static str>,
+    pub(crate) problem: Option<&'static str>,
     /// A remark on a viable body.
-    pub note: Option<&'static str>,
+    pub(crate) note: Option<&'static str>,
 }
 
 /// A scenario of `morphcog simulate`, as far as the page supports it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Loaded {
+pub(crate) struct Loaded {
     /// The body.
-    pub body: Body,
+    pub(crate) body: Body,
     /// The stimulus; `None` is all dark.
-    pub stimulus: Option<crate::base::Grid<f64>>,
+    pub(crate) stimulus: Option<crate::base::Grid<f64>>,
     /// The length of the simulation, cut to the page's limit.
-    pub control_steps: u64,
+    pub(crate) control_steps: u64,
     /// A note on unsupported parts.
-    pub note: Option<String>,
+    pub(crate) note: Option<String>,
 }
 
 impl Service {
@@ -119,7 +119,7 @@ impl Service {
     }
 
     /// Returns the current status.
-    pub fn status(&self) -> ServiceStatus {
+    pub(crate) fn status(&self) -> ServiceStatus {
         ServiceStatus {
             version: env!("CARGO_PKG_VERSION"),
             simulations: self.simulations.running(),
@@ -129,7 +129,7 @@ impl Service {
     }
 
     /// Checks if a body is viable.
-    pub fn check(&self, body: &Body) -> Checked {
+    pub(crate) fn check(&self, body: &Body) -> Checked {
         let counts = body.counts();
         let connected = body.is_connected();
         let problem = match (counts.total, connected) {
@@ -150,7 +150,7 @@ impl Service {
     ///
     /// # Errors
     /// Returns an error if it is invalid, or the page does not support it.
-    pub fn load(&self, text: &str) -> Result<Loaded, HttpRefusal> {
+    pub(crate) fn load(&self, text: &str) -> Result<Loaded, HttpRefusal> {
         let scenario = Scenario::parse(text, "scenario")?;
         if *scenario.physics() != Physics::default() {
             let text =
@@ -180,7 +180,7 @@ impl Service {
     ///
     /// # Errors
     /// Returns an error if the request is invalid.
-    pub fn plan(&self, request: request::SimulationRequest) -> Result<RolloutPlan, HttpRefusal> {
+    pub(crate) fn plan(&self, request: request::SimulationRequest) -> Result<RolloutPlan, HttpRefusal> {
         request.plan(&self.catalogue, &self.images)
     }
 }

@@ -4,7 +4,7 @@ use crate::base::error::Error;
 
 /// A reason for refusing a request, with one clear line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum HttpRefusal {
+pub(crate) enum HttpRefusal {
     /// The request is invalid.
     #[error("{0}")]
     Wrong(String),

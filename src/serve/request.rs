@@ -11,16 +11,16 @@ use crate::task::stimulus::{Encoding, Reduction, StimulusParams, stimulus};
 use serde::Deserialize;
 
 /// Maximum number of control steps in a simulation, across image changes: a hundred cycles.
-pub const MAX_STEPS: u32 = 5000;
+pub(crate) const MAX_STEPS: u32 = 5000;
 /// The largest side of a drawing \[pixels\].
-pub const MAX_PICTURE: usize = 128;
+pub(crate) const MAX_PICTURE: usize = 128;
 /// The fastest pace other than "as fast as possible".
-pub const MAX_SPEED: f64 = 16.0;
+pub(crate) const MAX_SPEED: f64 = 16.0;
 
 /// A robot of a collection, or any body with the parameters of its stimulus.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct SubjectRequest {
+pub(crate) struct SubjectRequest {
     /// The number of the collection.
     archive: Option<usize>,
     /// The id of the robot there.
@@ -34,7 +34,7 @@ pub struct SubjectRequest {
 /// The visible image, at most one of the three; none is dark.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ImageChoice {
+pub(crate) struct ImageChoice {
     /// A drawing: 0 paper … 255 ink, rows from the top.
     drawing: Option<Grid<u8>>,
     /// A test image.
@@ -46,7 +46,7 @@ pub struct ImageChoice {
 /// A request to begin a simulation.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct SimulationRequest {
+pub(crate) struct SimulationRequest {
     /// The robot.
     subject: SubjectRequest,
     /// The image.
@@ -61,7 +61,7 @@ pub struct SimulationRequest {
 /// A request for a body's stimulus, without a simulation.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct SeeRequest {
+pub(crate) struct SeeRequest {
     subject: SubjectRequest,
     #[serde(default)]
     shown: ImageChoice,
@@ -70,18 +70,18 @@ pub struct SeeRequest {
 /// A request to change a running simulation.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ChangeRequest {
+pub(crate) struct ChangeRequest {
     /// The image from now on.
-    pub shown: Option<ImageChoice>,
+    pub(crate) shown: Option<ImageChoice>,
     /// The speed as a multiple of real time; 0: as fast as possible.
-    pub speed: Option<f64>,
+    pub(crate) speed: Option<f64>,
     /// True to pause, false to continue.
-    pub paused: Option<bool>,
+    pub(crate) paused: Option<bool>,
 }
 
 /// The pace of a simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Pace {
+pub(crate) enum Pace {
     /// A multiple of real time.
     Times(f64),
     /// As fast as possible.
@@ -93,7 +93,7 @@ impl Pace {
     ///
     /// # Errors
     /// Returns an error if it is no valid speed.
-    pub fn of(speed: f64) -> Result<Self, HttpRefusal> {
+    pub(crate) fn of(speed: f64) -> Result<Self, HttpRefusal> {
         match speed {
             0.0 => Ok(Pace::Free),
             times if (0.1..=MAX_SPEED).contains(&times) => Ok(Pace::Times(times)),
@@ -106,22 +106,22 @@ impl Pace {
 
 /// A stimulus with its class, if that is known.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SeenPixels {
+pub(crate) struct SeenPixels {
     /// The stimulus, H × W in \[0, 1\].
-    pub stimulus: Grid<f64>,
+    pub(crate) stimulus: Grid<f64>,
     /// The class of a test image.
-    pub label: Option<u8>,
+    pub(crate) label: Option<u8>,
 }
 
 /// A valid plan for a simulation.
 #[derive(Clone, Debug)]
-pub struct RolloutPlan {
+pub(crate) struct RolloutPlan {
     /// The robot.
-    pub who: Who,
+    pub(crate) who: Who,
     /// The first stimulus.
-    pub seen: SeenPixels,
+    pub(crate) seen: SeenPixels,
     /// The pace.
-    pub pace: Pace,
+    pub(crate) pace: Pace,
 }
 
 impl SubjectRequest {
@@ -155,7 +155,7 @@ impl ImageChoice {
     ///
     /// # Errors
     /// Returns an error if the image is invalid.
-    pub fn seen(self, who: &Who, images: &ImageSets) -> Result<SeenPixels, HttpRefusal> {
+    pub(crate) fn seen(self, who: &Who, images: &ImageSets) -> Result<SeenPixels, HttpRefusal> {
         let (height, width) = (who.body.height(), who.body.width());
         let reduce = |pixels: &Grid<u8>| {
             stimulus(pixels, height, width, &who.encoding)
@@ -219,7 +219,11 @@ impl SeeRequest {
     ///
     /// # Errors
     /// Returns an error if the request is invalid.
-    pub fn seen(self, catalogue: &RobotCatalogue, images: &ImageSets) -> Result<SeenPixels, HttpRefusal> {
+    pub(crate) fn seen(
+        self,
+        catalogue: &RobotCatalogue,
+        images: &ImageSets,
+    ) -> Result<SeenPixels, HttpRefusal> {
         let who = self.subject.find(catalogue)?;
         self.shown.seen(&who, images)
     }
@@ -229,7 +233,7 @@ impl SeeRequest {
 ///
 /// # Errors
 /// Returns an error, with the key, if the request is invalid.
-pub fn read<T: serde::de::DeserializeOwned>(body: &[u8]) -> Result<T, HttpRefusal> {
+pub(crate) fn read<T: serde::de::DeserializeOwned>(body: &[u8]) -> Result<T, HttpRefusal> {
     let text =
         std::str::from_utf8(body).map_err(|_| HttpRefusal::Wrong("request: not UTF-8 text".to_string()))?;
     crate::config::reading::read_json(text, "request").map_err(HttpRefusal::from)

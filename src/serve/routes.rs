@@ -12,7 +12,7 @@ use serde::Deserialize;
 use serde_json::json;
 
 /// The reaction to a request.
-pub enum Reply {
+pub(crate) enum Reply {
     /// Sends a complete response.
     Whole(HttpResponse),
     /// Begins a simulation.
@@ -22,7 +22,7 @@ pub enum Reply {
 }
 
 /// Answers a request.
-pub fn reply(service: &Service, request: &Request) -> Reply {
+pub(crate) fn reply(service: &Service, request: &Request) -> Reply {
     if let Err(refusal) = service.hosts.check(request) {
         return Reply::Whole(refusal);
     }
@@ -95,7 +95,7 @@ pub fn reply(service: &Service, request: &Request) -> Reply {
 }
 
 /// Converts a refusal to an HTTP response.
-pub fn refused(refusal: HttpRefusal) -> HttpResponse {
+pub(crate) fn refused(refusal: HttpRefusal) -> HttpResponse {
     let status = match refusal {
         HttpRefusal::Wrong(_) => 400,
         HttpRefusal::Unknown(_) => 404,

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Control steps per second of a robot's own time.
-pub const STEPS_PER_SECOND: f64 = 50.0;
+pub(crate) const STEPS_PER_SECOND: f64 = 50.0;
 /// The number of moments in a message when the simulation runs as fast as possible.
 const BATCH: u32 = 20;
 /// Time between messages in real time.
@@ -23,7 +23,7 @@ pub(super) const HEARTBEAT: Duration = Duration::from_millis(400);
 const MOST_BEHIND: f64 = 0.5;
 
 /// An event of a simulation.
-pub enum Event<'a> {
+pub(crate) enum Event<'a> {
     /// The simulation begins, at rest.
     Begin {
         /// The number of the simulation.
@@ -68,13 +68,13 @@ pub enum Event<'a> {
 
 /// The listener has gone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Gone;
+pub(crate) struct Gone;
 
 /// Runs a simulation and passes its events to `tell`.
 ///
 /// # Errors
 /// Returns [`Gone`] as soon as `tell` does.
-pub fn live(
+pub(crate) fn live(
     slot: &Slot,
     plan: &RolloutPlan,
     mut tell: impl FnMut(Event) -> Result<(), Gone>,

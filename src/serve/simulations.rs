@@ -25,9 +25,9 @@ struct Wishes {
 }
 
 /// The control of a simulation in another thread.
-pub struct Control {
+pub(crate) struct Control {
     /// The robot.
-    pub who: Who,
+    pub(crate) who: Who,
     wishes: Mutex<Wishes>,
     changed: Condvar,
     /// True if the simulation should end; checked in every substep.
@@ -37,15 +37,15 @@ pub struct Control {
 /// The changes requested since the simulation last checked.
 #[derive(Debug, Default)]
 pub(crate) struct News {
-    pub pace: Option<Pace>,
-    pub paused: Option<bool>,
-    pub seen: Option<SeenPixels>,
-    pub end: bool,
+    pub(crate) pace: Option<Pace>,
+    pub(crate) paused: Option<bool>,
+    pub(crate) seen: Option<SeenPixels>,
+    pub(crate) end: bool,
 }
 
 impl Control {
     /// Requests a change.
-    pub fn change(&self, pace: Option<Pace>, paused: Option<bool>, seen: Option<SeenPixels>) {
+    pub(crate) fn change(&self, pace: Option<Pace>, paused: Option<bool>, seen: Option<SeenPixels>) {
         let mut wishes = lock(&self.wishes);
         wishes.pace = pace.or(wishes.pace);
         wishes.paused = paused.or(wishes.paused);
@@ -57,7 +57,7 @@ impl Control {
     }
 
     /// Requests an immediate end.
-    pub fn end(&self) {
+    pub(crate) fn end(&self) {
         let wishes = lock(&self.wishes);
         self.over.store(true, Ordering::Relaxed);
         drop(wishes);
@@ -65,7 +65,7 @@ impl Control {
     }
 
     /// Returns true if an end was requested.
-    pub fn is_over(&self) -> bool {
+    pub(crate) fn is_over(&self) -> bool {
         self.over.load(Ordering::Relaxed)
     }
 
@@ -97,17 +97,17 @@ struct Running {
 
 /// The running simulations.
 #[derive(Default)]
-pub struct Simulations {
+pub(crate) struct Simulations {
     running: Mutex<Running>,
 }
 
 /// A slot among [`Simulations`], freed on drop.
-pub struct Slot<'a> {
+pub(crate) struct Slot<'a> {
     simulations: &'a Simulations,
     /// The number of the simulation.
-    pub id: u64,
+    pub(crate) id: u64,
     /// The control of the simulation.
-    pub control: Arc<Control>,
+    pub(crate) control: Arc<Control>,
 }
 
 impl Simulations {
@@ -115,7 +115,7 @@ impl Simulations {
     ///
     /// # Errors
     /// Returns an error if all slots are taken.
-    pub fn begin(&self, who: Who) -> Result<Slot<'_>, HttpRefusal> {
+    pub(crate) fn begin(&self, who: Who) -> Result<Slot<'_>, HttpRefusal> {
         let mut running = lock(&self.running);
         if running.closed || running.simulations.len() >= MAX_SIMULATIONS {
             let text =
@@ -138,24 +138,24 @@ impl Simulations {
     ///
     /// # Errors
     /// Returns an error if no simulation has that number (any more).
-    pub fn simulation(&self, id: u64) -> Result<Arc<Control>, HttpRefusal> {
+    pub(crate) fn simulation(&self, id: u64) -> Result<Arc<Control>, HttpRefusal> {
         let found = lock(&self.running).simulations.get(&id).cloned();
         found
             .ok_or_else(|| HttpRefusal::Unknown(format!("there is no simulation {id}; perhaps it has ended")))
     }
 
     /// Returns the number of running simulations.
-    pub fn running(&self) -> usize {
+    pub(crate) fn running(&self) -> usize {
         lock(&self.running).simulations.len()
     }
 
     /// Returns the number of simulations begun so far.
-    pub fn begun(&self) -> u64 {
+    pub(crate) fn begun(&self) -> u64 {
         lock(&self.running).begun
     }
 
     /// Ends all simulations and prevents new ones.
-    pub fn close(&self) {
+    pub(crate) fn close(&self) {
         let mut running = lock(&self.running);
         running.closed = true;
         running.simulations.values().for_each(|control| control.end());

@@ -15,7 +15,7 @@ use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::{Value, json};
 
 /// Encodes an event.
-pub fn text(event: &Event) -> String {
+pub(crate) fn text(event: &Event) -> String {
     let (name, data) = match event {
         Event::Begin { id, plan, voxels, frame } => ("begin", begin(*id, plan, voxels, frame)),
         Event::Seen { step, until, seen } => ("seen", looks(*step, *until, seen)),
@@ -32,7 +32,7 @@ pub fn text(event: &Event) -> String {
 }
 
 /// Encodes a team's event.
-pub fn of_team(event: &TeamEvent) -> String {
+pub(crate) fn of_team(event: &TeamEvent) -> String {
     let (name, data) = match event {
         TeamEvent::Begin { id, plan, classes, stands } => {
             let member = |((name, who, _), (voxels, frame)): (

@@ -23,20 +23,20 @@ const LEAST: usize = 2;
 
 /// The identity of a robot in the team.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Name {
+pub(crate) struct Name {
     /// The number of its collection.
-    pub archive: usize,
+    pub(crate) archive: usize,
     /// The id of the robot.
-    pub robot: String,
+    pub(crate) robot: String,
     /// The task, such as "4|9".
-    pub task: String,
+    pub(crate) task: String,
     /// The judge of its walks.
-    pub judge: Readout,
+    pub(crate) judge: Readout,
 }
 
 /// Returns the team: for every task, the fittest robot of the first archive that has one. All share
 /// the dataset with the most tasks. If there are fewer than two, returns the shipped team.
-pub fn members(collections: &[Arc<Collection>]) -> Vec<Name> {
+pub(crate) fn members(collections: &[Arc<Collection>]) -> Vec<Name> {
     type Numbered<'a> = Vec<(usize, &'a Arc<Collection>)>;
     let (built_in, archives): (Numbered, Numbered) =
         collections.iter().enumerate().partition(|(_, from)| from.path.is_none());
@@ -72,7 +72,7 @@ fn largest<'a>(collections: impl IntoIterator<Item = (usize, &'a Arc<Collection>
 }
 
 /// Returns the classes that a team tells apart, in order.
-pub fn classes<'a>(judges: impl IntoIterator<Item = &'a Readout>) -> Vec<u8> {
+pub(crate) fn classes<'a>(judges: impl IntoIterator<Item = &'a Readout>) -> Vec<u8> {
     let all: BTreeSet<u8> =
         judges.into_iter().flat_map(|judge| judge.left.iter().chain(&judge.right)).copied().collect();
     all.into_iter().collect()
@@ -81,7 +81,7 @@ pub fn classes<'a>(judges: impl IntoIterator<Item = &'a Readout>) -> Vec<u8> {
 /// A request to begin a team's walk.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct TeamRequest {
+pub(crate) struct TeamRequest {
     /// The image.
     #[serde(default)]
     shown: ImageChoice,
@@ -93,15 +93,15 @@ pub struct TeamRequest {
 
 /// A valid plan for a team's walk.
 #[derive(Clone, Debug)]
-pub struct TeamPlan {
+pub(crate) struct TeamPlan {
     /// The robots with their stimuli; at least two.
-    pub members: Vec<(Name, Who, SeenPixels)>,
+    pub(crate) members: Vec<(Name, Who, SeenPixels)>,
     /// The common stimulus that covers all windows.
-    pub together: SeenPixels,
+    pub(crate) together: SeenPixels,
     /// The number of control steps.
-    pub control_steps: u32,
+    pub(crate) control_steps: u32,
     /// The pace.
-    pub pace: Pace,
+    pub(crate) pace: Pace,
 }
 
 impl TeamRequest {
@@ -109,7 +109,11 @@ impl TeamRequest {
     ///
     /// # Errors
     /// Returns an error if the request is invalid.
-    pub fn plan(self, catalogue: &RobotCatalogue, images: &ImageSets) -> Result<TeamPlan, HttpRefusal> {
+    pub(crate) fn plan(
+        self,
+        catalogue: &RobotCatalogue,
+        images: &ImageSets,
+    ) -> Result<TeamPlan, HttpRefusal> {
         let collections = catalogue.collections();
         let names = members(&collections);
         let mut members = Vec::new();
@@ -133,7 +137,7 @@ impl TeamRequest {
 }
 
 /// An event of a team's walk.
-pub enum TeamEvent<'a> {
+pub(crate) enum TeamEvent<'a> {
     /// The walk begins, at rest.
     Begin {
         /// The number of the walk.
@@ -174,7 +178,7 @@ struct Walker<'a> {
 ///
 /// # Errors
 /// Returns [`Gone`] as soon as `tell` does.
-pub fn live(
+pub(crate) fn live(
     slot: &Slot,
     plan: &TeamPlan,
     pool: &rayon::ThreadPool,

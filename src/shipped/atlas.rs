@@ -6,10 +6,10 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 /// Prefix of the names of the atlas's runs.
-pub const PREFIX: &str = "atlas:";
+pub(crate) const PREFIX: &str = "atlas:";
 
 /// Environment variable with the folder of the atlas.
-pub const VARIABLE: &str = "MORPHCOG_ATLAS";
+pub(crate) const VARIABLE: &str = "MORPHCOG_ATLAS";
 
 /// Folder of the atlas in the repository, searched second.
 const FOLDER: &str = "data/atlas";
@@ -28,7 +28,7 @@ fn variable() -> Option<std::ffi::OsString> {
 }
 
 /// Returns the folder of the atlas that has a run.
-pub fn folder_of(run: &str) -> Option<PathBuf> {
+pub(crate) fn folder_of(run: &str) -> Option<PathBuf> {
     folders(variable().as_deref()).into_iter().find(|folder| holds_run(&folder.join(run)))
 }
 
@@ -36,7 +36,7 @@ pub fn folder_of(run: &str) -> Option<PathBuf> {
 ///
 /// # Errors
 /// Returns an error that names the places searched, the runs there are, and how to get the atlas.
-pub fn file(run: &str, file: &str) -> io::Result<PathBuf> {
+pub(crate) fn file(run: &str, file: &str) -> io::Result<PathBuf> {
     found(run, file, variable().as_deref())
 }
 
@@ -85,7 +85,7 @@ fn seed(name: &str) -> Option<u64> {
 
 /// Returns the `run.json` of a run, or of every seed of a set. Without either, returns the path of
 /// a run of that name; reading it reports the problem.
-pub fn runs(name: &str) -> Vec<PathBuf> {
+pub(crate) fn runs(name: &str) -> Vec<PathBuf> {
     seeds(name, variable().as_deref())
 }
 

@@ -4,10 +4,10 @@
 use std::path::{Path, PathBuf};
 
 /// Prefix of the names of shipped runs.
-pub const PREFIX: &str = "gallery:";
+pub(crate) const PREFIX: &str = "gallery:";
 
 /// The run of the published robots. It has no files: `robots::published` builds it from a list.
-pub const PUBLISHED: &str = "gallery:";
+pub(crate) const PUBLISHED: &str = "gallery:";
 
 /// Robots that tell zeros from ones, best run first; the default where there are no other runs.
 pub const ZERO_ONE: &str = "gallery:zero_one";
@@ -16,7 +16,7 @@ pub const ZERO_ONE: &str = "gallery:zero_one";
 pub const TEAM: &str = "gallery:team";
 
 /// Gaits to train, as in `demo`; they have no task, so they are not in `gallery:all`.
-pub const GAITS: &str = "gallery:gaits";
+pub(crate) const GAITS: &str = "gallery:gaits";
 
 /// All runs that have a task.
 const ALL: &str = "gallery:all";
@@ -90,7 +90,7 @@ const SETS: &[Set] = &[
 ];
 
 /// Returns the text of a file of a run; none if there is no such run or file.
-pub fn text(name: &str, file: &str) -> Option<&'static str> {
+pub(crate) fn text(name: &str, file: &str) -> Option<&'static str> {
     let (_, files) = SETS.iter().flat_map(|(_, runs)| *runs).find(|(run, _)| *run == name)?;
     files.iter().find(|(own, _)| *own == file).map(|(_, text)| *text)
 }
@@ -99,7 +99,7 @@ pub fn text(name: &str, file: &str) -> Option<&'static str> {
 ///
 /// # Errors
 /// Returns an error that lists the runs if none has that name.
-pub fn runs(name: &str) -> Result<Vec<PathBuf>, String> {
+pub(crate) fn runs(name: &str) -> Result<Vec<PathBuf>, String> {
     if name == PUBLISHED {
         return Ok(vec![Path::new(PUBLISHED).join("run.json")]);
     }

@@ -1,7 +1,7 @@
 //! Runs identified by a name instead of a path: shipped runs (`gallery:zero_one-1`) and those of
 //! the atlas (`atlas:zero_one-1`). Their results go to the current folder.
 
-pub mod atlas;
+pub(crate) mod atlas;
 pub mod gallery;
 
 use crate::base::files::{self, open_file, read_limited};
@@ -31,18 +31,18 @@ pub fn is_named(path: &Path) -> bool {
 }
 
 /// Returns the collection of a named run (`gallery`, `atlas`), and its name.
-pub fn name(path: &Path) -> Option<(&str, &str)> {
+pub(crate) fn name(path: &Path) -> Option<(&str, &str)> {
     parts(path)?.0.split_once(':')
 }
 
 /// Returns the collection of a named run, and its set: the part before its seed or digits.
-pub fn set(path: &Path) -> Option<(&str, &str)> {
+pub(crate) fn set(path: &Path) -> Option<(&str, &str)> {
     let (of, run) = name(path)?;
     Some((of, run.rsplit_once('-')?.0))
 }
 
 /// Returns the atlas folder that has a named run; `None` for other paths.
-pub fn atlas_of(path: &Path) -> Option<PathBuf> {
+pub(crate) fn atlas_of(path: &Path) -> Option<PathBuf> {
     let (name, _) = parts(path)?;
     atlas::folder_of(name.strip_prefix(atlas::PREFIX)?)
 }
@@ -60,7 +60,7 @@ fn place(path: &Path) -> Option<io::Result<Place>> {
 ///
 /// # Errors
 /// As [`files::read_text`]; if the atlas lacks the file, the error says what to do.
-pub fn read_text(path: &Path) -> io::Result<String> {
+pub(crate) fn read_text(path: &Path) -> io::Result<String> {
     match place(path).transpose()? {
         Some(Place::Shipped(text)) => Ok(text.to_string()),
         Some(Place::Compressed(file)) => read_limited(MultiGzDecoder::new(open_file(&file)?)),
@@ -69,7 +69,7 @@ pub fn read_text(path: &Path) -> io::Result<String> {
 }
 
 /// Returns true if a file exists, of a named run or on the disk.
-pub fn exists(path: &Path) -> bool {
+pub(crate) fn exists(path: &Path) -> bool {
     place(path).map_or_else(|| path.exists(), |place| place.is_ok())
 }
 
@@ -77,7 +77,7 @@ pub fn exists(path: &Path) -> bool {
 ///
 /// # Errors
 /// Returns an error that lists the shipped runs if none of them has that name.
-pub fn runs(path: &Path) -> Result<Vec<PathBuf>, String> {
+pub(crate) fn runs(path: &Path) -> Result<Vec<PathBuf>, String> {
     let (name, _) = parts(path).expect("callers ask is_named before");
     name.strip_prefix(atlas::PREFIX).map_or_else(|| gallery::runs(name), |run| Ok(atlas::runs(run)))
 }

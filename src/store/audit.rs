@@ -18,9 +18,9 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// The `format` of `audit.json`.
-pub const FORMAT: &str = "morphcog-audit";
+pub(crate) const FORMAT: &str = "morphcog-audit";
 /// The newest version of its schema.
-pub const FORMAT_VERSION: u32 = 1;
+pub(crate) const FORMAT_VERSION: u32 = 1;
 
 /// The content of `audit.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -28,18 +28,18 @@ pub const FORMAT_VERSION: u32 = 1;
 pub struct AuditFile {
     /// The constant "morphcog-audit".
     #[schemars(extend("const" = FORMAT))]
-    pub format: String,
+    pub(crate) format: String,
     /// The version of this schema.
     #[schemars(range(min = 1, max = FORMAT_VERSION))]
-    pub format_version: u32,
+    pub(crate) format_version: u32,
     /// The version of morphcog that wrote the file.
-    pub program_version: String,
+    pub(crate) program_version: String,
     /// The name of the audited run.
-    pub run: String,
+    pub(crate) run: String,
     /// The SHA-256 of that run's content: verdicts on another state of it are stale.
     pub run_sha256: String,
     /// The number of robots in that run.
-    pub elites: usize,
+    pub(crate) elites: usize,
     /// The criteria of the verdicts.
     pub criteria: Criteria,
     /// The robots audited so far, in the order of the run.
@@ -53,19 +53,19 @@ pub struct RobotAudit {
     /// The id of the robot.
     pub id: String,
     /// The task of the robot.
-    pub task: String,
+    pub(crate) task: String,
     /// The verdict.
     pub verdict: Verdict,
     /// The reason: for `exploits`, what the robot exploits.
-    pub reason: String,
+    pub(crate) reason: String,
     /// The share of the perturbed rollouts in which its behaviour persists.
     #[serde(deserialize_with = "ranges::share")]
-    pub persisting: f64,
+    pub(crate) persisting: f64,
     /// The root mean square change of displacements from the unchanged rollout, voxel lengths.
     #[serde(deserialize_with = "ranges::size")]
-    pub spread: f64,
+    pub(crate) spread: f64,
     /// The energies put in per actuation cycle in the unchanged rollout \[mass·wu²/s²\].
-    pub energy_per_cycle: Energy,
+    pub(crate) energy_per_cycle: Energy,
     /// The displacements under the training images, unchanged, voxel lengths; null if unstable.
     #[serde(default, deserialize_with = "ranges::number")]
     pub displacements: Option<Vec<f64>>,
@@ -121,7 +121,7 @@ impl Stored for AuditFile {
 
 impl AuditFile {
     /// Creates a file without robots.
-    pub fn new(run: &str, run_sha256: String, elites: usize, criteria: &Criteria) -> Self {
+    pub(crate) fn new(run: &str, run_sha256: String, elites: usize, criteria: &Criteria) -> Self {
         AuditFile {
             format: FORMAT.to_string(),
             format_version: FORMAT_VERSION,
@@ -142,17 +142,9 @@ impl AuditFile {
         results::read(path, Some("audit"))
     }
 
-    /// Parses the text of the file; `name` appears in messages.
-    ///
-    /// # Errors
-    /// Returns an error if the text holds no valid verdicts.
-    pub fn parse(text: &str, name: &str) -> Result<Self, Error> {
-        results::parse(text, name)
-    }
-
     /// Returns the path of the verdicts on a run: beside its `run.json`, or for a shipped run in
     /// the current folder, if there are any.
-    pub fn path(run_json: &Path) -> PathBuf {
+    pub(crate) fn path(run_json: &Path) -> PathBuf {
         let made = folder::beside(run_json, AUDIT_JSON);
         if exists(&made) { made } else { run_json.with_file_name(AUDIT_JSON) }
     }
@@ -203,7 +195,7 @@ impl AuditFile {
     ///
     /// # Errors
     /// Returns an error if they are invalid, or about another state of the run.
-    pub fn if_any(run: &RunFile, run_json: &Path) -> Result<Option<Self>, Error> {
+    pub(crate) fn if_any(run: &RunFile, run_json: &Path) -> Result<Option<Self>, Error> {
         match exists(&AuditFile::path(run_json)) {
             true => AuditFile::of_run(run, run_json).map(Some),
             false => Ok(None),
@@ -214,7 +206,7 @@ impl AuditFile {
     ///
     /// # Errors
     /// Returns an error if there are none, or they are invalid.
-    pub fn near(folder: &Path, run_sha256: &str) -> Result<Self, Error> {
+    pub(crate) fn near(folder: &Path, run_sha256: &str) -> Result<Self, Error> {
         let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
         let mut folders: Vec<PathBuf> =
             std::fs::read_dir(here).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
@@ -258,7 +250,7 @@ impl AuditFile {
     }
 
     /// Encodes `audit.csv`: a line per robot and rollout, the unchanged one first.
-    pub fn to_csv(&self) -> Vec<u8> {
+    pub(crate) fn to_csv(&self) -> Vec<u8> {
         let images = self.robots.iter().filter_map(|r| r.displacements.as_ref()).map(Vec::len).max();
         let images = images.unwrap_or(0);
         let about = ["id", "task", "verdict", "reason", "persisting", "spread", "drive_per_cycle"];
@@ -294,7 +286,7 @@ impl AuditFile {
     ///
     /// # Errors
     /// Returns an error if a file cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), Error> {
+    pub(crate) fn write(&self, path: &Path) -> Result<(), Error> {
         write_with_table(path, &self.to_json(), &self.to_csv(), [])
     }
 }
@@ -316,7 +308,7 @@ pub enum Verdict {
 
 impl Verdict {
     /// Returns the verdict in words.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Verdict::Physical => "physical",
             Verdict::Fragile => "fragile",
@@ -331,20 +323,20 @@ impl Verdict {
 #[serde(deny_unknown_fields)]
 pub struct PerturbedRollout {
     /// The change and its size.
-    pub name: String,
+    pub(crate) name: String,
     /// The kind of the change.
-    pub kind: PerturbationKind,
+    pub(crate) kind: PerturbationKind,
     /// The displacement under each training image, voxel lengths (mirrored back if the rollout is
     /// mirrored); null if unstable.
     #[serde(default, deserialize_with = "ranges::number")]
-    pub displacements: Option<Vec<f64>>,
+    pub(crate) displacements: Option<Vec<f64>>,
     /// The share of the images answered correctly in the unchanged rollout for which the robot
     /// still walks the correct way.
     #[serde(deserialize_with = "ranges::share")]
-    pub kept: f64,
+    pub(crate) kept: f64,
     /// The walks in the correct direction under these images, relative to the unchanged rollout.
     #[serde(deserialize_with = "ranges::number")]
-    pub distance: f64,
+    pub(crate) distance: f64,
     /// True if the behaviour persists.
     pub persists: bool,
 }

@@ -12,9 +12,9 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// The `format` of `capacity.json`.
-pub const FORMAT: &str = "morphcog-capacity";
+pub(crate) const FORMAT: &str = "morphcog-capacity";
 /// The newest version of its schema.
-pub const FORMAT_VERSION: u32 = 1;
+pub(crate) const FORMAT_VERSION: u32 = 1;
 
 /// The content of `capacity.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -22,28 +22,28 @@ pub const FORMAT_VERSION: u32 = 1;
 pub struct CapacityFile {
     /// The constant "morphcog-capacity".
     #[schemars(extend("const" = FORMAT))]
-    pub format: String,
+    pub(crate) format: String,
     /// The version of this schema.
     #[schemars(range(min = 1, max = FORMAT_VERSION))]
-    pub format_version: u32,
+    pub(crate) format_version: u32,
     /// The version of morphcog that wrote the file.
-    pub program_version: String,
+    pub(crate) program_version: String,
     /// The name of the evaluated run, or names of the runs.
-    pub run: String,
+    pub(crate) run: String,
     /// The identifier of the evaluation: its runs, images, robots and their walks.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub eval_sha256: Option<String>,
+    pub(crate) eval_sha256: Option<String>,
     /// The selection of the robots, in words.
-    pub selected: String,
+    pub(crate) selected: String,
     /// The name of the dataset.
-    pub dataset: String,
+    pub(crate) dataset: String,
     /// The images that stop a training: "test" as in the paper, or "validation".
     pub patience_on: String,
     /// The number of trainings from scratch per size.
-    pub trainings: usize,
+    pub(crate) trainings: usize,
     /// True if only robots count that an audit found physical.
     #[serde(default, skip_serializing_if = "is_false")]
-    pub physical_only: bool,
+    pub(crate) physical_only: bool,
     /// True if a signal stopped the analysis before the end.
     pub stopped: bool,
     /// The tasks.
@@ -64,7 +64,7 @@ pub struct TaskCapacity {
     pub robots: usize,
     /// The mean accuracy of the robots on test images, 0 to 1.
     #[serde(deserialize_with = "ranges::share")]
-    pub accuracy: f64,
+    pub(crate) accuracy: f64,
     /// A curve per kind of network.
     pub curves: Vec<Curve>,
 }
@@ -74,7 +74,7 @@ pub struct TaskCapacity {
 #[serde(deny_unknown_fields)]
 pub struct Curve {
     /// The kind: "mlp" (size: hidden neurons) or "cnn" (size: kernels).
-    pub network: String,
+    pub(crate) network: String,
     /// The points, by size.
     pub points: Vec<Point>,
     /// The coefficients c0, c1, c2 of accuracy ≈ c0 + c1·size + c2·size², least squares.
@@ -82,7 +82,7 @@ pub struct Curve {
     pub fit: Option<[f64; 3]>,
     /// The smallest size at which the fit reaches the robots' accuracy, or a note that the smallest
     /// network already exceeds it; null if the fit never reaches it.
-    pub capacity: Option<Crossing>,
+    pub(crate) capacity: Option<Crossing>,
 }
 
 /// Networks of one size.
@@ -96,7 +96,7 @@ pub struct Point {
     pub mean: f64,
     /// The standard deviation over the trainings; null for a single one.
     #[serde(default, deserialize_with = "ranges::share")]
-    pub standard_deviation: Option<f64>,
+    pub(crate) standard_deviation: Option<f64>,
     /// The number of trainable parameters.
     pub parameters: usize,
 }
@@ -148,19 +148,19 @@ impl CapacityFile {
 
     /// Returns the default path for the analysis of an evaluation: `capacity.json` beside it, or
     /// `gallery-zero_one-capacity.json` beside `gallery-zero_one-eval.json`.
-    pub fn beside(eval: &Path) -> PathBuf {
+    pub(crate) fn beside(eval: &Path) -> PathBuf {
         let of = eval.file_name().and_then(|name| name.to_str()?.strip_suffix(EVAL_JSON));
         eval.with_file_name(format!("{}{CAPACITY_JSON}", of.unwrap_or_default()))
     }
 
     /// Reads the analysis beside an `eval.json`, if it has the same robots and images.
-    pub fn of(report: &EvalFile, eval: &Path) -> Option<Self> {
+    pub(crate) fn of(report: &EvalFile, eval: &Path) -> Option<Self> {
         let found = Self::read(&Self::beside(eval)).ok()?;
         found.is_of(report).then_some(found)
     }
 
     /// Returns true if the analysis has the same robots and images as an evaluation.
-    pub fn is_of(&self, report: &EvalFile) -> bool {
+    pub(crate) fn is_of(&self, report: &EvalFile) -> bool {
         let same = |task: &TaskCapacity| {
             report.means.get(&task.task).is_some_and(|mean| {
                 mean.robots == task.robots && (mean.accuracy - task.accuracy).abs() < 1e-9
@@ -173,7 +173,7 @@ impl CapacityFile {
     }
 
     /// Encodes `capacity.csv`: a line per task, network and size.
-    pub fn to_csv(&self) -> Vec<u8> {
+    pub(crate) fn to_csv(&self) -> Vec<u8> {
         let columns =
             ["task", "network", "size", "parameters", "mean", "standard_deviation", "fit", "robots"];
         let rows = self.tasks.iter().flat_map(|task| {
@@ -189,7 +189,7 @@ impl CapacityFile {
     }
 
     /// Encodes the file as JSON.
-    pub fn to_json(&self) -> String {
+    pub(crate) fn to_json(&self) -> String {
         // Numbers are finite and keys are text, so encoding cannot fail.
         serde_json::to_string_pretty(self).expect("JSON has all of it") + "\n"
     }
@@ -204,7 +204,7 @@ impl TaskCapacity {
 
 impl Curve {
     /// Returns the fit at a size.
-    pub fn value(&self, size: f64) -> Option<f64> {
+    pub(crate) fn value(&self, size: f64) -> Option<f64> {
         self.fit.map(|[c0, c1, c2]| c0 + size * (c1 + size * c2))
     }
 }

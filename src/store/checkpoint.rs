@@ -53,7 +53,7 @@ impl KnownBodies {
     }
 
     /// Removes a body's key.
-    pub fn remove(&mut self, key: &[u8; 16]) {
+    pub(crate) fn remove(&mut self, key: &[u8; 16]) {
         self.0.remove(key);
     }
 }
@@ -102,7 +102,7 @@ pub fn write(folder: &Path, checkpoint: &Checkpoint) -> Result<(), Error> {
 ///
 /// # Errors
 /// Returns an error if all checkpoints are damaged.
-pub fn read(folder: &Path, mut warn: impl FnMut(String)) -> Result<Option<Checkpoint>, Error> {
+pub(crate) fn read(folder: &Path, mut warn: impl FnMut(String)) -> Result<Option<Checkpoint>, Error> {
     let [newest, previous] = CHECKPOINTS.map(|name| folder.join(name));
     let first = match read_one(&newest) {
         Ok(Some(checkpoint)) => return Ok(Some(checkpoint)),

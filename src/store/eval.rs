@@ -23,9 +23,9 @@ use std::mem::replace;
 use std::path::Path;
 
 /// The `format` of `eval.json`.
-pub const FORMAT: &str = "morphcog-eval";
+pub(crate) const FORMAT: &str = "morphcog-eval";
 /// The newest version of its schema.
-pub const FORMAT_VERSION: u32 = 1;
+pub(crate) const FORMAT_VERSION: u32 = 1;
 
 /// The tolerance of a share against its quotient: other programs round shares.
 const ROUNDING: f64 = 1e-6;
@@ -35,16 +35,16 @@ const ROUNDING: f64 = 1e-6;
 pub struct EvalFile {
     /// The constant "morphcog-eval".
     #[schemars(extend("const" = FORMAT))]
-    pub format: String,
+    pub(crate) format: String,
     /// The version of this schema.
     #[schemars(range(min = 1, max = FORMAT_VERSION))]
-    pub format_version: u32,
+    pub(crate) format_version: u32,
     /// The version of morphcog that wrote the file.
-    pub program_version: String,
+    pub(crate) program_version: String,
     /// The name of the (first) run of the robots.
-    pub run: String,
+    pub(crate) run: String,
     /// The seed of that run.
-    pub run_seed: u64,
+    pub(crate) run_seed: u64,
     /// All runs of the robots.
     #[serde(default)]
     pub runs: Vec<RunRef>,
@@ -57,7 +57,7 @@ pub struct EvalFile {
     pub dataset: String,
     /// The SHA-256 of its test split, if those images were used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub test_sha256: Option<String>,
+    pub(crate) test_sha256: Option<String>,
     /// The robots' training data, if that is another dataset.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trained_on: Option<DatasetRef>,
@@ -65,12 +65,12 @@ pub struct EvalFile {
     #[serde(default, skip_serializing_if = "HeldOut::is_default")]
     pub split: HeldOut,
     /// The seed of all random draws.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// The number of control steps per image, each a fresh rollout.
     pub control_steps: u32,
     /// The displacement up to which an answer counts as wrong \[voxel lengths\].
     #[serde(deserialize_with = "ranges::size")]
-    pub threshold: f64,
+    pub(crate) threshold: f64,
     /// True if the evaluation ended before the last robot, by a signal or otherwise.
     pub stopped: bool,
     /// The images.
@@ -93,7 +93,7 @@ pub struct Baselines {
     #[serde(deserialize_with = "ranges::share")]
     pub best_single_pixel: f64,
     /// That pixel: row, column.
-    pub pixel: [usize; 2],
+    pub(crate) pixel: [usize; 2],
     /// The accuracy of the nearest of the run's training images; absent for another dataset.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "ranges::share")]
     pub nearest_training_image: Option<f64>,
@@ -103,16 +103,16 @@ pub struct Baselines {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Mean {
     /// The number of robots.
-    pub robots: usize,
+    pub(crate) robots: usize,
     /// The mean accuracy.
     #[serde(deserialize_with = "ranges::share")]
     pub accuracy: f64,
     /// The mean balanced accuracy.
     #[serde(deserialize_with = "ranges::share")]
-    pub balanced_accuracy: f64,
+    pub(crate) balanced_accuracy: f64,
     /// The standard deviation of the accuracy over the robots; absent for a single one.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "ranges::share")]
-    pub standard_deviation: Option<f64>,
+    pub(crate) standard_deviation: Option<f64>,
     /// The 95 % bootstrap interval of the mean accuracy: percentiles of 10,000 resamples. With
     /// several runs, it resamples runs and then the robots of each.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "ranges::interval")]
@@ -153,7 +153,7 @@ pub struct RobotReport {
     pub per_class: BTreeMap<u8, f64>,
     /// The mean |displacement| of the stable rollouts, voxel lengths.
     #[serde(deserialize_with = "ranges::size")]
-    pub mean_distance: f64,
+    pub(crate) mean_distance: f64,
     /// The share of images under which it moved no farther than the threshold.
     #[serde(deserialize_with = "ranges::share")]
     pub not_moved: f64,
@@ -171,7 +171,7 @@ pub struct RobotReport {
 
 impl RobotReport {
     /// Returns the report without displacements.
-    pub fn without_displacements(&self) -> Self {
+    pub(crate) fn without_displacements(&self) -> Self {
         RobotReport { displacements: Vec::new(), ..self.clone() }
     }
 }
@@ -301,7 +301,7 @@ impl EvalFile {
 
     /// Describes the selection of the robots for people, including training on another dataset and
     /// an early stop by a signal.
-    pub fn selection(&self) -> String {
+    pub(crate) fn selection(&self) -> String {
         let stopped = if self.stopped { "; stopped before the last of them" } else { "" };
         let trained =
             self.trained_on.as_ref().map_or(String::new(), |own| format!(", trained on {}", own.name));
@@ -312,7 +312,7 @@ impl EvalFile {
     ///
     /// # Errors
     /// Returns the errors of [`EvalFile::read`], or an error if the runs or their states differ.
-    pub fn of_runs(path: &Path, runs: &[&RunFile]) -> Result<Self, Error> {
+    pub(crate) fn of_runs(path: &Path, runs: &[&RunFile]) -> Result<Self, Error> {
         let file = Self::read(path)?;
         let now: Vec<String> = runs.iter().map(|run| run.fingerprint()).collect();
         match file.runs.iter().find(|run| !now.contains(&run.sha256)) {
@@ -342,13 +342,13 @@ impl EvalFile {
     }
 
     /// Encodes the file as one line of JSON.
-    pub fn to_json(&self) -> String {
+    pub(crate) fn to_json(&self) -> String {
         // Numbers are finite, keys are text or whole numbers, so encoding cannot fail.
         serde_json::to_string(self).expect("JSON has all of it") + "\n"
     }
 
     /// Encodes `eval.csv`: a line per robot.
-    pub fn to_csv(&self) -> Vec<u8> {
+    pub(crate) fn to_csv(&self) -> Vec<u8> {
         let classes: Vec<u8> =
             self.robots.first().map_or(Vec::new(), |robot| robot.per_class.keys().copied().collect());
         let about = ["id", "run_seed", "task", "objective", "first_group_walks", "right", "images"];

@@ -49,7 +49,7 @@ pub enum IfExists {
 
 /// A run's folder, in use by this process as long as the value exists.
 #[derive(Debug)]
-pub struct RunFolder {
+pub(crate) struct RunFolder {
     path: PathBuf,
     /// True if it replaces the run in it.
     replaces: bool,
@@ -57,7 +57,7 @@ pub struct RunFolder {
 }
 
 /// Returns true if a process is working on the run in a folder.
-pub fn is_in_use(folder: &Path) -> bool {
+pub(crate) fn is_in_use(folder: &Path) -> bool {
     matches!(lock::state(&folder.join(LOCK)), Ok(lock::LockState::Held(_)))
 }
 
@@ -67,7 +67,7 @@ impl RunFolder {
     /// # Errors
     /// If another process uses it, or it holds a run and `if_exists` says to refuse, or it cannot
     /// be written, or it is stopped while it waits for a sign of life of another process.
-    pub fn open(path: &Path, if_exists: IfExists, session: &Session) -> Result<Self, Error> {
+    pub(crate) fn open(path: &Path, if_exists: IfExists, session: &Session) -> Result<Self, Error> {
         if shipped::is_named(path) {
             let text = "expected another name: so are runs called that lie elsewhere";
             return Err(Error::argument("out", path.display(), text));
@@ -106,7 +106,7 @@ impl RunFolder {
     }
 
     /// Returns the path of the folder.
-    pub fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
@@ -157,7 +157,7 @@ impl RunFolder {
 ///
 /// # Errors
 /// Returns an error if it holds a run.
-pub fn vacant(folder: &Path) -> Result<(), Error> {
+pub(crate) fn vacant(folder: &Path) -> Result<(), Error> {
     let of_run = RunFolder::files().into_iter().filter(|name| ![CONFIG, DATA_FOLDER].contains(name));
     if !of_run.into_iter().any(|name| folder.join(name).exists()) {
         return Ok(());
@@ -253,7 +253,7 @@ fn is_result(path: &Path) -> bool {
 ///
 /// # Errors
 /// Returns an error with the reason if it cannot.
-pub fn writable(path: &Path) -> Result<(), Error> {
+pub(crate) fn writable(path: &Path) -> Result<(), Error> {
     if is_result(path) {
         return Err(Error::usage(format!("{}: {OF_RUN}", path.display())));
     }
@@ -271,7 +271,7 @@ fn not_of_run(path: &Path) -> Result<(), Error> {
 ///
 /// # Errors
 /// Returns an error if it does not.
-pub fn of_file(path: &Path) -> Result<(), Error> {
+pub(crate) fn of_file(path: &Path) -> Result<(), Error> {
     let last = path.as_os_str().as_encoded_bytes().last();
     let ends_open = last.is_some_and(|&byte| std::path::is_separator(byte.into()));
     match ends_open || path.file_name().is_none() {
@@ -307,7 +307,7 @@ pub fn run_json(path: PathBuf) -> Result<Vec<PathBuf>, String> {
 ///
 /// # Errors
 /// Returns the errors of [`run_json`], or an error if there are several.
-pub fn one_run(path: PathBuf) -> Result<PathBuf, String> {
+pub(crate) fn one_run(path: PathBuf) -> Result<PathBuf, String> {
     let mut runs = run_json(path)?;
     match runs.as_slice() {
         [] | [_] => Ok(runs.pop().expect("a path means at least one run")),
@@ -322,12 +322,12 @@ pub fn one_run(path: PathBuf) -> Result<PathBuf, String> {
 ///
 /// # Errors
 /// Returns the errors of [`run_json`].
-pub fn first_run(path: PathBuf) -> Result<PathBuf, String> {
+pub(crate) fn first_run(path: PathBuf) -> Result<PathBuf, String> {
     Ok(run_json(path)?.into_iter().next().expect("a path means at least one run"))
 }
 
 /// Returns a run as a value for `--archive`: its name if it ships, else its run.json.
-pub fn archive(run_json: &Path) -> Value {
+pub(crate) fn archive(run_json: &Path) -> Value {
     match full_name(run_json) {
         Some(name) => Value::Word(name),
         None => Value::Path(run_json.to_path_buf()),
@@ -356,7 +356,7 @@ pub fn beside(archive: &Path, name: &str) -> PathBuf {
 
 /// Returns the default path of joint results of several runs: in their common folder. With shipped
 /// runs it is in the current folder, with the name of their set if they share one.
-pub fn beside_all(archives: &[PathBuf], name: &str) -> PathBuf {
+pub(crate) fn beside_all(archives: &[PathBuf], name: &str) -> PathBuf {
     let [first, others @ ..] = archives else { return PathBuf::from(name) };
     if others.is_empty() {
         return beside(first, name);
@@ -383,7 +383,7 @@ fn above(archives: &[PathBuf]) -> PathBuf {
 ///
 /// # Errors
 /// Returns an error if there is none.
-pub fn newest_run() -> Result<PathBuf, Error> {
+pub(crate) fn newest_run() -> Result<PathBuf, Error> {
     let runs = std::fs::read_dir(RUNS).into_iter().flatten().flatten();
     let files = runs.map(|entry| entry.path().join(RUN_JSON));
     let found = files.filter_map(|file| Some((file.metadata().ok()?, file)));

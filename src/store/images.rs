@@ -44,7 +44,7 @@ impl HeldOut {
     }
 
     /// Returns the split of the dataset that has these images.
-    pub fn split(&self) -> Split {
+    pub(crate) fn split(&self) -> Split {
         match self {
             HeldOut::Test => Split::Test,
             HeldOut::Validation => Split::Train,

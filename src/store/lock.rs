@@ -41,14 +41,14 @@ const TRIES: u32 = 5;
 /// The process that holds a lock.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Holder {
+pub(crate) struct Holder {
     /// The name of the machine.
-    pub host: String,
+    pub(crate) host: String,
     /// The number of the process.
-    pub process: u32,
+    pub(crate) process: u32,
     /// The heartbeat counter, which starts at the current time \[ns\]. Processes in containers may
     /// share numbers and machine names.
-    pub beats: u64,
+    pub(crate) beats: u64,
 }
 
 impl std::fmt::Display for Holder {
@@ -59,7 +59,7 @@ impl std::fmt::Display for Holder {
 
 /// The state of a lock file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum LockState {
+pub(crate) enum LockState {
     /// No process holds it.
     Free,
     /// A process holds it, with its name if the file contains it.
@@ -73,7 +73,7 @@ pub enum LockState {
 
 /// A reason why a lock was not taken.
 #[derive(Debug)]
-pub enum LockRefusal {
+pub(crate) enum LockRefusal {
     /// Another process holds it, with its name if the file contains it.
     Held(Option<Holder>),
     /// A stop signal ended the wait.
@@ -98,7 +98,7 @@ impl From<Stopped> for LockRefusal {
 
 impl LockRefusal {
     /// Converts to an error for the user: `held` describes the other process, `advice` the remedy.
-    pub fn into_error(self, path: &Path, held: &str, advice: &str) -> Error {
+    pub(crate) fn into_error(self, path: &Path, held: &str, advice: &str) -> Error {
         match self {
             LockRefusal::Held(holder) => {
                 let by = holder.map_or(String::new(), |holder| format!(" ({holder})"));
@@ -128,7 +128,7 @@ const DEFAULT: LockPolicy =
 /// A taken lock, released on drop. While it exists, this process writes to the folder only what it
 /// may: see [`Ownership`].
 #[derive(Debug)]
-pub struct Lock {
+pub(crate) struct Lock {
     own: Arc<Own>,
     heart: Option<JoinHandle<()>>,
     _ownership: Ownership,
@@ -142,7 +142,7 @@ impl Lock {
     ///
     /// # Errors
     /// If another process has it; if it is stopped while it waits; what the system says.
-    pub fn take(path: &Path, session: &Session) -> Result<Self, LockRefusal> {
+    pub(crate) fn take(path: &Path, session: &Session) -> Result<Self, LockRefusal> {
         Lock::take_in(path, DEFAULT, session)
     }
 
@@ -152,7 +152,7 @@ impl Lock {
     ///
     /// # Errors
     /// As [`Lock::take`].
-    pub fn take_contended(path: &Path, session: &Session) -> Result<Self, LockRefusal> {
+    pub(crate) fn take_contended(path: &Path, session: &Session) -> Result<Self, LockRefusal> {
         Lock::take_in(path, LockPolicy { is_contended: true, ..DEFAULT }, session)
     }
 
@@ -284,7 +284,7 @@ fn now() -> u64 {
 
 /// Returns the states of lock files. It watches hearts that are silent by this machine's clock
 /// slightly longer than a heartbeat, all at once.
-pub fn states(paths: &[PathBuf]) -> Vec<LockState> {
+pub(crate) fn states(paths: &[PathBuf]) -> Vec<LockState> {
     // An unreadable file gives no information.
     let mut all: Vec<LockState> = paths.iter().map(|path| state(path).unwrap_or(LockState::Free)).collect();
     let began = Instant::now();
@@ -309,7 +309,7 @@ pub fn states(paths: &[PathBuf]) -> Vec<LockState> {
 ///
 /// # Errors
 /// Returns the system's error.
-pub fn state(path: &Path) -> io::Result<LockState> {
+pub(crate) fn state(path: &Path) -> io::Result<LockState> {
     use io::ErrorKind::{NotFound, PermissionDenied, ReadOnlyFilesystem};
     let file = match File::options().read(true).write(true).open(path) {
         Err(error) if error.kind() == NotFound => return Ok(LockState::Free),

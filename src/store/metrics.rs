@@ -21,30 +21,30 @@ use std::path::{Path, PathBuf};
 #[serde(deny_unknown_fields)]
 pub struct Totals {
     /// The number of offspring made.
-    pub evaluations: u64,
+    pub(crate) evaluations: u64,
     /// The number of showings simulated.
-    pub simulated: u64,
+    pub(crate) simulated: u64,
     /// The number of showings saved because the body was known.
-    pub saved_known_bodies: u64,
+    pub(crate) saved_known_bodies: u64,
     /// The number of showings saved by stopping early (or because an earlier one was unstable).
-    pub saved_early_stop: u64,
+    pub(crate) saved_early_stop: u64,
     /// The number of showings saved because another image looks the same to the sensors.
-    pub saved_shared_rollouts: u64,
+    pub(crate) saved_shared_rollouts: u64,
     /// The number of unstable offspring.
-    pub unstable: u64,
+    pub(crate) unstable: u64,
     /// The wall-clock time of all sessions of the run \[s\].
     #[serde(deserialize_with = "ranges::size")]
-    pub seconds: f64,
+    pub(crate) seconds: f64,
 }
 
 impl Totals {
     /// Returns the total of showings saved.
-    pub fn saved(&self) -> u64 {
+    pub(crate) fn saved(&self) -> u64 {
         self.saved_known_bodies + self.saved_early_stop + self.saved_shared_rollouts
     }
 
     /// Counts one evaluation.
-    pub fn count(&mut self, evaluation: &Evaluation) {
+    pub(crate) fn count(&mut self, evaluation: &Evaluation) {
         self.simulated += evaluation.simulated;
         self.saved_early_stop += evaluation.stopped;
         self.saved_shared_rollouts += evaluation.shared;
@@ -55,11 +55,11 @@ const HEADER: &str = "generation,num_elites,coverage,qd_score,norm_qd_score,obj_
 simulated,saved,saved_known_bodies,saved_early_stop,saved_shared_rollouts,unstable,seconds";
 
 /// The writer of `metrics.csv`.
-pub struct Metrics {
+pub(crate) struct Metrics {
     path: PathBuf,
     file: BufWriter<File>,
     /// The number of earlier generations whose lines are missing.
-    pub missing: u64,
+    pub(crate) missing: u64,
 }
 
 impl Metrics {
@@ -68,7 +68,7 @@ impl Metrics {
     ///
     /// # Errors
     /// Returns an error if it cannot be read or written.
-    pub fn open(folder: &Path, generations: u64) -> Result<Self, Error> {
+    pub(crate) fn open(folder: &Path, generations: u64) -> Result<Self, Error> {
         let path = folder.join(METRICS);
         let old = match read_bytes(&path) {
             _ if generations == 0 => String::new(),
@@ -93,7 +93,12 @@ impl Metrics {
     ///
     /// # Errors
     /// Returns an error if it cannot be written.
-    pub fn write(&mut self, generation: u64, stats: &ArchiveStats, totals: &Totals) -> Result<(), Error> {
+    pub(crate) fn write(
+        &mut self,
+        generation: u64,
+        stats: &ArchiveStats,
+        totals: &Totals,
+    ) -> Result<(), Error> {
         let ArchiveStats { num_elites, coverage, qd_score, norm_qd_score, obj_max, obj_mean } = stats;
         let number = |value: &Option<f64>| value.map_or(String::new(), |value| value.to_string());
         let (obj_max, obj_mean) = (number(obj_max), number(obj_mean));
@@ -114,7 +119,7 @@ impl Metrics {
     ///
     /// # Errors
     /// Returns an error if they cannot be written.
-    pub fn flush(&mut self) -> Result<(), Error> {
+    pub(crate) fn flush(&mut self) -> Result<(), Error> {
         let written = ownership::check(&self.path).and_then(|()| self.file.flush());
         written.map_err(|error| Error::writing(&self.path, &error))
     }
@@ -122,31 +127,31 @@ impl Metrics {
 
 /// A line of `metrics.csv`, reduced to what figures need.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-pub struct Moment {
+pub(crate) struct Moment {
     /// The generation, from 0.
-    pub generation: u64,
+    pub(crate) generation: u64,
     /// The number of offspring made so far.
     #[serde(deserialize_with = "ranges::size")]
-    pub evaluations: f64,
+    pub(crate) evaluations: f64,
     /// The share of possible cells with an elite.
     #[serde(deserialize_with = "ranges::share")]
-    pub coverage: f64,
+    pub(crate) coverage: f64,
     /// The sum of the objectives, each less the offset.
     #[serde(deserialize_with = "ranges::number")]
-    pub qd_score: f64,
+    pub(crate) qd_score: f64,
     /// The largest objective; `None` without elites.
     #[serde(default, deserialize_with = "ranges::number")]
-    pub obj_max: Option<f64>,
+    pub(crate) obj_max: Option<f64>,
     /// The wall-clock time so far \[s\].
     #[serde(default, deserialize_with = "ranges::size")]
-    pub seconds: f64,
+    pub(crate) seconds: f64,
 }
 
 /// Reads the metrics.csv beside a run.json, without checking that they match.
 ///
 /// # Errors
 /// Returns an error, with its line, if the file is missing or invalid.
-pub fn moments(archive: &Path) -> Result<Vec<Moment>, Error> {
+pub(crate) fn moments(archive: &Path) -> Result<Vec<Moment>, Error> {
     let path = archive.with_file_name(METRICS);
     let text = read_text(&path).map_err(|error| Error::reading(&path, &error))?;
     // A run in progress may be writing the last line.
@@ -159,7 +164,7 @@ pub fn moments(archive: &Path) -> Result<Vec<Moment>, Error> {
 ///
 /// # Errors
 /// Returns the errors of [`moments`], or an error if the file is of another run or state.
-pub fn moments_of(run: &RunFile, archive: &Path) -> Result<Vec<Moment>, Error> {
+pub(crate) fn moments_of(run: &RunFile, archive: &Path) -> Result<Vec<Moment>, Error> {
     let moments = moments(archive)?;
     let Some(last) = run.generations.checked_sub(1) else { return Ok(moments) };
     let ArchiveStats { coverage, qd_score, obj_max, .. } = run.stats;

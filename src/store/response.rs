@@ -20,12 +20,12 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// The `format` of `response.json`.
-pub const FORMAT: &str = "morphcog-response";
+pub(crate) const FORMAT: &str = "morphcog-response";
 /// The newest version of its schema.
-pub const FORMAT_VERSION: u32 = 1;
+pub(crate) const FORMAT_VERSION: u32 = 1;
 
 /// The extensions of a robot's pictures beside the results.
-pub const PICTURES: [&str; 2] = ["svg", "png"];
+pub(crate) const PICTURES: [&str; 2] = ["svg", "png"];
 
 /// The content of `response.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -33,16 +33,16 @@ pub const PICTURES: [&str; 2] = ["svg", "png"];
 pub struct ResponseFile {
     /// The constant "morphcog-response".
     #[schemars(extend("const" = FORMAT))]
-    pub format: String,
+    pub(crate) format: String,
     /// The version of this schema.
     #[schemars(range(min = 1, max = FORMAT_VERSION))]
-    pub format_version: u32,
+    pub(crate) format_version: u32,
     /// The version of morphcog that wrote the file.
-    pub program_version: String,
+    pub(crate) program_version: String,
     /// The name of the robots' run.
     pub run: String,
     /// The seed of the run.
-    pub run_seed: u64,
+    pub(crate) run_seed: u64,
     /// The SHA-256 of its `run.json`.
     pub run_sha256: String,
     /// The settings of the measurement.
@@ -61,17 +61,17 @@ pub struct ResponseSetting {
     /// The seed of the random images.
     pub seed: u64,
     /// The maximum number of rollouts per robot, not counting those known before.
-    pub images: usize,
+    pub(crate) images: usize,
     /// The relative error of the slopes at which a measurement ends.
     #[serde(deserialize_with = "ranges::share")]
-    pub error: f64,
+    pub(crate) error: f64,
     /// The dataset of the task's images.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub dataset: Option<DatasetRef>,
+    pub(crate) dataset: Option<DatasetRef>,
     /// The conditions that alternate between images.
     pub conditions: Vec<Condition>,
     /// The number of control steps per image.
-    pub control_steps: u32,
+    pub(crate) control_steps: u32,
     /// The task whose trained accuracy is estimated, if one was named.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub task: Option<String>,
@@ -119,22 +119,22 @@ pub struct RobotResponse {
     pub ended_by: EndedBy,
     /// The error of the slopes relative to their size, 0 to 1.
     #[serde(deserialize_with = "ranges::share")]
-    pub relative_error: f64,
+    pub(crate) relative_error: f64,
     /// The share of the displacements' variance that slopes fitted to other rollouts explain.
     #[serde(deserialize_with = "ranges::at_most_one")]
     pub r_squared: f64,
     /// The standard deviation that these slopes leave unexplained \[voxel lengths\].
     #[serde(deserialize_with = "ranges::size")]
-    pub noise: f64,
+    pub(crate) noise: f64,
     /// The part that the true slopes would leave unexplained \[voxel lengths\].
     #[serde(deserialize_with = "ranges::size")]
-    pub scatter: f64,
+    pub(crate) scatter: f64,
     /// The penalty of the ridge regression.
     #[serde(deserialize_with = "ranges::size")]
-    pub ridge: f64,
+    pub(crate) ridge: f64,
     /// The displacement if no place had any width, the mean over conditions \[voxel lengths\].
     #[serde(deserialize_with = "ranges::number")]
-    pub intercept: f64,
+    pub(crate) intercept: f64,
     /// The intercept under each condition; null without stable rollouts.
     #[serde(deserialize_with = "ranges::number")]
     pub intercepts: Vec<Option<f64>>,
@@ -154,9 +154,9 @@ pub struct RobotResponse {
 #[serde(deny_unknown_fields)]
 pub struct Unfinished {
     /// The id, or the name of a published robot.
-    pub id: String,
+    pub(crate) id: String,
     /// The body.
-    pub body: Body,
+    pub(crate) body: Body,
     /// The displacements under the random images so far, as for a measured robot \[voxel lengths\].
     #[serde(deserialize_with = "ranges::number")]
     pub displacements: Vec<Option<f64>>,
@@ -175,12 +175,12 @@ pub struct ResponsePlace {
     pub slope: f64,
     /// The standard error of the slope \[voxel lengths\].
     #[serde(deserialize_with = "ranges::size")]
-    pub error: f64,
+    pub(crate) error: f64,
 }
 
 impl ResponsePlace {
     /// Returns true if the slope is within two standard errors of zero.
-    pub fn is_uncertain(&self) -> bool {
+    pub(crate) fn is_uncertain(&self) -> bool {
         self.slope.abs() < 2.0 * self.error
     }
 }
@@ -191,7 +191,7 @@ impl ResponsePlace {
 pub struct TrainingEstimate {
     /// The mean clipped margin of its answers, `mean_clipped`: from −1 to 1.
     #[serde(deserialize_with = "ranges::number")]
-    pub fitness: f64,
+    pub(crate) fitness: f64,
     /// The 95 % interval of the fitness.
     #[serde(deserialize_with = "ranges::fitness_interval")]
     pub fitness_interval: [f64; 2],
@@ -357,13 +357,13 @@ impl ResponseFile {
     }
 
     /// Encodes the file as JSON: the head on one line, then one line per robot.
-    pub fn to_json(&self) -> String {
+    pub(crate) fn to_json(&self) -> String {
         let head = ResponseFile { robots: Vec::new(), ..self.clone() };
         by_lines(&head, &self.robots)
     }
 
     /// Encodes `response.csv`: a line per robot and place.
-    pub fn to_csv(&self) -> Vec<u8> {
+    pub(crate) fn to_csv(&self) -> Vec<u8> {
         let rows = self.robots.iter().flat_map(|robot| {
             robot.places.iter().map(|ResponsePlace { row, column, slope, error }| {
                 let material = robot.body.voxels()[(*row, *column)].code();
@@ -378,13 +378,13 @@ impl ResponseFile {
     ///
     /// # Errors
     /// Returns an error if a file cannot be written.
-    pub fn write(&self, path: &Path, outdated: &[[PathBuf; 2]]) -> Result<(), Error> {
+    pub(crate) fn write(&self, path: &Path, outdated: &[[PathBuf; 2]]) -> Result<(), Error> {
         write_with_table(path, &self.to_json(), &self.to_csv(), outdated.iter().flatten().cloned())
     }
 }
 
 /// Returns the SVG and PNG paths of robots' pictures beside `out`; one robot alone has its stem.
-pub fn pictures(out: &Path, ids: &[&str]) -> Vec<[PathBuf; 2]> {
+pub(crate) fn pictures(out: &Path, ids: &[&str]) -> Vec<[PathBuf; 2]> {
     let stem = out.file_stem().expect("its name was checked before anything was measured").to_string_lossy();
     let named = |id: &&str| match ids.len() {
         1 => PICTURES.map(|ending| out.with_extension(ending)),

@@ -25,9 +25,9 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 /// The `format` of `run.json`.
-pub const FORMAT: &str = "morphcog-run";
+pub(crate) const FORMAT: &str = "morphcog-run";
 /// The newest version of its schema; a reader refuses newer ones.
-pub const FORMAT_VERSION: u32 = 1;
+pub(crate) const FORMAT_VERSION: u32 = 1;
 
 /// The arguments that stand for a run.
 const WHAT_RUNS: &str = "expected a run.json, its folder, or runs that ship, such as gallery:zero_one";
@@ -75,9 +75,9 @@ impl Robot {
 #[serde(deny_unknown_fields)]
 pub struct Dimensions {
     /// The names: muscle, sensor, total, and with several tasks, task.
-    pub names: Vec<String>,
+    pub(crate) names: Vec<String>,
     /// The number of bins of each.
-    pub bins: Vec<usize>,
+    pub(crate) bins: Vec<usize>,
     /// The number of cells that a body can have; coverage is a fraction of it.
     pub possible_cells: usize,
     /// The names of the tasks, in the order of their bins.
@@ -89,7 +89,7 @@ impl Dimensions {
     ///
     /// # Errors
     /// Returns an error if the config has no tasks.
-    pub fn of(config: &Config) -> Result<Self, Error> {
+    pub(crate) fn of(config: &Config) -> Result<Self, Error> {
         let grouping = config.grouping()?;
         let tasks: Vec<String> = grouping.tasks().iter().map(|split| split.name()).collect();
         let space = DescriptorSpace::voxel_counts(tasks.len());
@@ -106,12 +106,12 @@ impl Dimensions {
 pub struct RunFile {
     /// The constant "morphcog-run".
     #[schemars(extend("const" = FORMAT))]
-    pub format: String,
+    pub(crate) format: String,
     /// The version of this schema.
     #[schemars(range(min = 1, max = FORMAT_VERSION))]
-    pub format_version: u32,
+    pub(crate) format_version: u32,
     /// The version of morphcog that wrote the file.
-    pub program_version: String,
+    pub(crate) program_version: String,
     /// The name of the run, from its config.
     pub name: String,
     /// The config with every key resolved, including the physics.
@@ -246,7 +246,7 @@ impl RunFile {
     }
 
     /// Reads only the generations completed and requested, if the file contains them.
-    pub fn progress(path: &Path) -> Option<(u64, u64)> {
+    pub(crate) fn progress(path: &Path) -> Option<(u64, u64)> {
         #[derive(Deserialize)]
         struct Whole {
             generations: u64,
@@ -261,7 +261,7 @@ impl RunFile {
     }
 
     /// Reads only the version of morphcog that made a run; returns it if it is not this one.
-    pub fn other_version(path: &Path) -> Option<String> {
+    pub(crate) fn other_version(path: &Path) -> Option<String> {
         #[derive(Deserialize)]
         struct Made {
             program_version: String,
@@ -274,7 +274,7 @@ impl RunFile {
     ///
     /// # Errors
     /// Returns the errors of [`RunFile::read`].
-    pub fn parse(text: &str, name: &str) -> Result<Self, Error> {
+    pub(crate) fn parse(text: &str, name: &str) -> Result<Self, Error> {
         let run: RunFile = results::parse(text, name)?;
         Ok(RunFile { read_sha256: Some(sha256_hex(text.as_bytes())), ..run })
     }
@@ -285,12 +285,12 @@ impl RunFile {
     }
 
     /// Returns the fitness function of its elites.
-    pub fn fitness(&self) -> Fitness {
+    pub(crate) fn fitness(&self) -> Fitness {
         self.config.evaluation.fitness
     }
 
     /// Formats a fitness with its unit.
-    pub fn in_units(&self, objective: f64) -> String {
+    pub(crate) fn in_units(&self, objective: f64) -> String {
         let unit = self.fitness().unit().map_or(String::new(), |unit| format!(" {unit}"));
         format!("{}{unit}", number::fixed(objective, 2))
     }
@@ -310,12 +310,12 @@ impl RunFile {
     }
 
     /// Returns an elite's answers to the training images.
-    pub fn answers(&self, robot: &Robot) -> Vec<Answer> {
+    pub(crate) fn answers(&self, robot: &Robot) -> Vec<Answer> {
         answers(&self.training_images, robot.displacements.iter().copied().map(Some))
     }
 
     /// Returns the judge of a robot's walks, or `None` for a gait or a robot of the same-way task.
-    pub fn judge(&self, robot: &Robot) -> Option<Readout> {
+    pub(crate) fn judge(&self, robot: &Robot) -> Option<Readout> {
         if self.config.measures_response() {
             return None;
         }
@@ -392,7 +392,7 @@ impl RunFile {
 ///
 /// # Errors
 /// Returns an error that names two equal runs.
-pub fn different<'a>(runs: impl IntoIterator<Item = (&'a Path, &'a RunFile)>) -> Result<(), Error> {
+pub(crate) fn different<'a>(runs: impl IntoIterator<Item = (&'a Path, &'a RunFile)>) -> Result<(), Error> {
     let mut known: Vec<(&Path, &RunFile)> = Vec::new();
     for (path, run) in runs {
         if let Some((first, other)) = known.iter().find(|(_, other)| other.is_same_run(run)) {

@@ -8,7 +8,7 @@ use crate::store::images::{DatasetRef, ImageRef};
 use crate::store::run::{Robot, RunFile};
 
 /// Creates a quick-start run with robots of these ids and objectives, each in its own cell.
-pub fn run(robots: &[(&str, f64)]) -> RunFile {
+pub(crate) fn run(robots: &[(&str, f64)]) -> RunFile {
     let config = Config::parse(BUILT_IN[0].1, BUILT_IN[0].0, &[]).unwrap();
     let image = |label| ImageRef { index: usize::from(label), label };
     let robot = |(number, (id, objective)): (usize, &(&str, f64))| {

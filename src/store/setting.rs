@@ -22,27 +22,27 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RunRef {
     /// The name of the run.
-    pub name: String,
+    pub(crate) name: String,
     /// The seed of the run.
     pub seed: u64,
     /// The number of generations completed.
-    pub generations: u64,
+    pub(crate) generations: u64,
     /// The images of its last training.
-    pub training_images: Vec<ImageRef>,
+    pub(crate) training_images: Vec<ImageRef>,
     /// The SHA-256 of its content.
     pub sha256: String,
     /// The name for `--archive`, if the run has a name in place of a path.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub archive: Option<String>,
+    pub(crate) archive: Option<String>,
 }
 
 /// The settings that give networks the same images as the robots.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RunSetting {
     /// The rows and columns of a stimulus.
-    pub body: BodyConfig,
+    pub(crate) body: BodyConfig,
     /// The classes and their groups.
-    pub task: TaskConfig,
+    pub(crate) task: TaskConfig,
     /// The data.
     pub data: DataConfig,
     /// The conversion from image to stimulus.

@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 
 /// A run, and where it lies.
 #[derive(Clone, Debug)]
-pub struct StoredRun {
+pub(crate) struct StoredRun {
     /// Its run.json; what else is known of its robots lies beside it.
-    pub path: PathBuf,
+    pub(crate) path: PathBuf,
     /// Its content.
-    pub run: RunFile,
+    pub(crate) run: RunFile,
 }
 
 impl StoredRun {
@@ -20,7 +20,7 @@ impl StoredRun {
     ///
     /// # Errors
     /// As [`RunFile::read`].
-    pub fn read(path: &Path) -> Result<Self, Error> {
+    pub(crate) fn read(path: &Path) -> Result<Self, Error> {
         Ok(StoredRun { path: path.to_path_buf(), run: RunFile::read(path)? })
     }
 

@@ -9,15 +9,15 @@ use serde_json::Value;
 use std::path::Path;
 
 /// The `format` of the file.
-pub const FORMAT: &str = "morphcog-task";
+pub(crate) const FORMAT: &str = "morphcog-task";
 
 /// The version of its schema.
-pub const FORMAT_VERSION: u32 = 1;
+pub(crate) const FORMAT_VERSION: u32 = 1;
 
 /// The state of a task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum TaskState {
+pub(crate) enum TaskState {
     /// All steps are done.
     Done,
     /// A process began it, and has not reported its end.
@@ -32,11 +32,11 @@ pub enum TaskState {
 
 impl TaskState {
     /// All states.
-    pub const ALL: [TaskState; 5] =
+    pub(crate) const ALL: [TaskState; 5] =
         [TaskState::Done, TaskState::Running, TaskState::Stopped, TaskState::Failed, TaskState::Waiting];
 
     /// Returns the name of the state.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             TaskState::Done => "done",
             TaskState::Running => "running",
@@ -50,28 +50,28 @@ impl TaskState {
 /// The content of `task.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct TaskFile {
+pub(crate) struct TaskFile {
     /// [`FORMAT`].
-    pub format: String,
+    pub(crate) format: String,
     /// [`FORMAT_VERSION`].
-    pub format_version: u32,
+    pub(crate) format_version: u32,
     /// The version of the program that wrote the file.
-    pub program_version: String,
+    pub(crate) program_version: String,
     /// Everything that the run depends on: dotted keys with their values.
-    pub settings: Settings,
+    pub(crate) settings: Settings,
     /// Requests that may change: generations or challengers, validation, steps after the run.
-    pub asked: Value,
+    pub(crate) asked: Value,
     /// The state of the task.
-    pub state: TaskState,
+    pub(crate) state: TaskState,
     /// The error of a failed task.
-    pub error: Option<String>,
+    pub(crate) error: Option<String>,
     /// The wall-clock time of all sessions that ended by themselves or by a signal \[s\].
-    pub seconds: f64,
+    pub(crate) seconds: f64,
 }
 
 impl TaskFile {
     /// Creates the file of a task that begins.
-    pub fn new(settings: Settings, asked: Value) -> Self {
+    pub(crate) fn new(settings: Settings, asked: Value) -> Self {
         TaskFile {
             format: FORMAT.to_string(),
             format_version: FORMAT_VERSION,
@@ -88,7 +88,7 @@ impl TaskFile {
     ///
     /// # Errors
     /// Returns an error if it is invalid.
-    pub fn read(path: &Path) -> Result<Option<Self>, Error> {
+    pub(crate) fn read(path: &Path) -> Result<Option<Self>, Error> {
         let text = match read_text(path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             read => read.map_err(|error| Error::reading(path, &error))?,
@@ -103,7 +103,7 @@ impl TaskFile {
     ///
     /// # Errors
     /// Returns an error if it cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), Error> {
+    pub(crate) fn write(&self, path: &Path) -> Result<(), Error> {
         let text = serde_json::to_string(self).expect("keys are text and numbers are finite") + "\n";
         write_atomically(path, text.as_bytes()).map_err(|error| Error::writing(path, &error))
     }

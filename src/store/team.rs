@@ -15,15 +15,15 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// The `format` of `team.json`.
-pub const FORMAT: &str = "morphcog-team";
+pub(crate) const FORMAT: &str = "morphcog-team";
 /// The newest version of its schema.
-pub const FORMAT_VERSION: u32 = 1;
+pub(crate) const FORMAT_VERSION: u32 = 1;
 
 /// The names of the figures beside it: the confusion matrix, and the poster of all bodies.
-pub const FIGURES: [&str; 2] = ["confusion", "bodies"];
+pub(crate) const FIGURES: [&str; 2] = ["confusion", "bodies"];
 
 /// Returns the files of a figure beside results in `out`, as SVG and as PNG.
-pub fn figure(out: &Path, name: &str) -> [PathBuf; 2] {
+pub(crate) fn figure(out: &Path, name: &str) -> [PathBuf; 2] {
     let stem = out.file_stem().unwrap_or_default().to_string_lossy();
     ["svg", "png"].map(|ending| out.with_file_name(format!("{stem}-{name}.{ending}")))
 }
@@ -37,30 +37,30 @@ const MOST_CYCLES: u32 = MAX_STEPS / 50;
 pub struct TeamFile {
     /// The constant "morphcog-team".
     #[schemars(extend("const" = FORMAT))]
-    pub format: String,
+    pub(crate) format: String,
     /// The version of this schema.
     #[schemars(range(min = 1, max = FORMAT_VERSION))]
-    pub format_version: u32,
+    pub(crate) format_version: u32,
     /// The version of morphcog that wrote the file.
-    pub program_version: String,
+    pub(crate) program_version: String,
     /// The classes to tell apart, in order.
     pub classes: Vec<u8>,
     /// The name of the dataset.
-    pub dataset: String,
+    pub(crate) dataset: String,
     /// The SHA-256 of its test split.
-    pub test_sha256: String,
+    pub(crate) test_sha256: String,
     /// The split of the images: test, or validation.
-    pub split: HeldOut,
+    pub(crate) split: HeldOut,
     /// The seed of the drawn images.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// The walk up to which a robot gives no vote \[voxel lengths\].
     #[serde(deserialize_with = "ranges::size")]
     pub threshold: f64,
     /// The walk up to which distances count in sums \[voxel lengths\].
     #[serde(deserialize_with = "ranges::size")]
-    pub clip: f64,
+    pub(crate) clip: f64,
     /// The number of actuation cycles per image, each image a fresh rollout.
-    pub cycles: u32,
+    pub(crate) cycles: u32,
     /// The images.
     pub images: Vec<ImageRef>,
     /// The robots evaluated so far.
@@ -82,7 +82,7 @@ pub struct Member {
     /// The id of the robot.
     pub id: String,
     /// The name of its run.
-    pub run: String,
+    pub(crate) run: String,
     /// The SHA-256 of its run.json.
     pub run_sha256: String,
     /// The task of the robot.
@@ -92,12 +92,12 @@ pub struct Member {
     /// The direction of the first group on the training images: "left" or "right".
     pub first_group_walks: String,
     /// The body.
-    pub body: Body,
+    pub(crate) body: Body,
     /// The accuracy on the images of its own classes.
     pub own: Accuracy,
     /// The share of all images under which it moved no farther than the threshold, or was unstable.
     #[serde(deserialize_with = "ranges::share")]
-    pub not_moved: f64,
+    pub(crate) not_moved: f64,
     /// The displacement under each image \[voxel lengths\]; null if unstable.
     #[serde(deserialize_with = "ranges::number")]
     pub displacements: Vec<Option<f64>>,
@@ -113,13 +113,13 @@ pub struct Answers {
     pub walks: Decoded,
     /// The share of images for which several classes had most votes.
     #[serde(deserialize_with = "ranges::share")]
-    pub ties: f64,
+    pub(crate) ties: f64,
     /// The share of the robots that know the answered class and voted for it, averaged over images.
     #[serde(deserialize_with = "ranges::share")]
-    pub agreement: f64,
+    pub(crate) agreement: f64,
     /// The mean number of robots that moved no farther than the threshold, or were unstable.
     #[serde(deserialize_with = "ranges::size")]
-    pub not_moved: f64,
+    pub(crate) not_moved: f64,
 }
 
 /// The answers of one decoder.
@@ -130,7 +130,7 @@ pub struct Decoded {
     pub accuracy: Accuracy,
     /// The share answered correctly, by class.
     #[serde(deserialize_with = "ranges::share")]
-    pub per_class: BTreeMap<u8, f64>,
+    pub(crate) per_class: BTreeMap<u8, f64>,
     /// The number of images by class (rows) and answer (columns), both in the order of `classes`.
     pub confusion: Vec<Vec<usize>>,
     /// The answer to each image.
@@ -143,7 +143,7 @@ pub struct Decoded {
 #[serde(deny_unknown_fields)]
 pub struct TeamBaselines {
     /// The number of training images for the linear classifiers and the nearest neighbour.
-    pub training_images: usize,
+    pub(crate) training_images: usize,
     /// A linear function for each class against all others; the largest wins.
     pub linear_one_against_rest: Accuracy,
     /// A linear function for each pair of classes, with votes like the team's. For a pair that a
@@ -152,9 +152,9 @@ pub struct TeamBaselines {
     /// The class of the nearest training image.
     pub nearest_neighbour: Accuracy,
     /// The best robot of the team by itself, with votes like the team's.
-    pub best_body: Accuracy,
+    pub(crate) best_body: Accuracy,
     /// The id of that robot.
-    pub best_body_id: String,
+    pub(crate) best_body_id: String,
 }
 
 /// The accuracy on some images.
@@ -167,7 +167,7 @@ pub struct Accuracy {
     pub accuracy: f64,
     /// Its 95 % Wilson interval.
     #[serde(deserialize_with = "ranges::interval")]
-    pub interval: [f64; 2],
+    pub(crate) interval: [f64; 2],
 }
 
 impl Accuracy {
@@ -264,7 +264,7 @@ impl Stored for TeamFile {
 
 impl Member {
     /// Returns the classes that a walk of this robot to either side votes for.
-    pub fn judge(&self) -> Readout {
+    pub(crate) fn judge(&self) -> Readout {
         let [a, b] = self.groups.clone();
         if self.first_group_walks == Direction::Left.name() {
             Readout { left: a, right: b }

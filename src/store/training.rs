@@ -16,9 +16,9 @@ pub(crate) const FILE: (&str, u32) = ("morphcog-training", 2);
 #[serde(deny_unknown_fields)]
 pub struct Origin {
     /// The name of the run.
-    pub name: String,
+    pub(crate) name: String,
     /// The number of its generations.
-    pub generations: u64,
+    pub(crate) generations: u64,
     /// The SHA-256 of its file.
     pub sha256: String,
     /// The indices of all images that its robots were ever trained on, if of the same data. They
@@ -38,42 +38,42 @@ pub struct Elsewhere {
     /// The SHA-256 of the training images.
     pub train_sha256: String,
     /// The indices of the run's last training images, and of those that its gaits were trained on.
-    pub indices: Vec<usize>,
+    pub(crate) indices: Vec<usize>,
     /// The images that it drew, if its config names none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub drawn: Option<Drawn>,
+    pub(crate) drawn: Option<Drawn>,
 }
 
 /// Images that were drawn at random.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub struct Drawn {
+pub(crate) struct Drawn {
     /// The classes.
-    pub classes: Vec<u8>,
+    pub(crate) classes: Vec<u8>,
     /// The number of images of each class.
-    pub images_per_class: usize,
+    pub(crate) images_per_class: usize,
     /// The seed.
-    pub seed: u64,
+    pub(crate) seed: u64,
 }
 
 /// Displacements that were simulated together, in the order of the images; `None` if unstable.
-pub type Batch = Vec<Option<f64>>;
+pub(crate) type Batch = Vec<Option<f64>>;
 
 /// The content of `training.json`.
 #[derive(Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct File {
+pub(crate) struct File {
     /// The `format` of the file.
-    pub format: String,
+    pub(crate) format: String,
     /// The version of its schema.
-    pub format_version: u32,
+    pub(crate) format_version: u32,
     /// The SHA-256 of everything that the rollouts depend on.
-    pub key: String,
+    pub(crate) key: String,
     /// The SHA-256 of `key` and `rollouts`, to detect damage; absent in files of version 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub checksum: Option<String>,
+    pub(crate) checksum: Option<String>,
     /// The rollouts in the order in which they were requested.
     #[serde(deserialize_with = "ranges::number")]
-    pub rollouts: Vec<Batch>,
+    pub(crate) rollouts: Vec<Batch>,
 }
 
 impl File {

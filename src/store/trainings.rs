@@ -51,7 +51,7 @@ impl Trainings {
     ///
     /// # Errors
     /// Returns an error if the file cannot be read, because its trainings would be lost.
-    pub fn read(results: &Path) -> Result<Self, Error> {
+    pub(crate) fn read(results: &Path) -> Result<Self, Error> {
         let path = results.with_extension("trainings.json");
         let empty =
             || Content { format: FORMAT.0.to_string(), format_version: FORMAT.1, ..Content::default() };
@@ -64,12 +64,12 @@ impl Trainings {
     }
 
     /// Returns the trainings of a size: accuracy, parameters.
-    pub fn of(&self, key: &str, size: usize) -> &[(f64, usize)] {
+    pub(crate) fn of(&self, key: &str, size: usize) -> &[(f64, usize)] {
         self.content.trainings.get(key).and_then(|sizes| sizes.get(&size)).map_or(&[], Vec::as_slice)
     }
 
     /// Adds the next trainings of a size.
-    pub fn extend(&mut self, key: &str, size: usize, trained: &[Trained]) {
+    pub(crate) fn extend(&mut self, key: &str, size: usize, trained: &[Trained]) {
         let sizes = self.content.trainings.entry(key.to_string()).or_default();
         sizes.entry(size).or_default().extend(trained.iter().map(|t| (t.accuracy, t.parameters)));
     }
@@ -78,7 +78,7 @@ impl Trainings {
     ///
     /// # Errors
     /// Returns an error if they cannot be written.
-    pub fn write(&self) -> Result<(), Error> {
+    pub(crate) fn write(&self) -> Result<(), Error> {
         let text =
             serde_json::to_string(&self.content).map_err(|error| Error::other(error.to_string()))? + "\n";
         write_atomically(&self.path, text.as_bytes()).map_err(|error| Error::writing(&self.path, &error))

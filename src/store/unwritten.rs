@@ -13,7 +13,7 @@ impl Unwritten {
     ///
     /// # Errors
     /// If the folder is no longer this process's: to try again would not help.
-    pub fn tried(&mut self, outcome: Result<(), Error>, session: &Session) -> Result<(), Error> {
+    pub(crate) fn tried(&mut self, outcome: Result<(), Error>, session: &Session) -> Result<(), Error> {
         if matches!(&outcome, Err(error) if error.kind == ErrorKind::Lost) {
             return outcome;
         }
@@ -25,7 +25,7 @@ impl Unwritten {
     }
 
     /// Returns the reason why the latest results are not in their file, if they are not.
-    pub fn error(self) -> Option<Error> {
+    pub(crate) fn error(self) -> Option<Error> {
         self.0
     }
 }

@@ -22,11 +22,11 @@ pub struct Validated {
     /// The id of the robot.
     pub id: String,
     /// The task of the robot.
-    pub task: String,
+    pub(crate) task: String,
     /// The number of images.
     pub images: usize,
     /// The number of images answered correctly.
-    pub right: usize,
+    pub(crate) right: usize,
     /// The mean over the two groups of the share answered correctly.
     #[serde(deserialize_with = "ranges::share")]
     pub balanced_accuracy: f64,
@@ -36,17 +36,17 @@ pub struct Validated {
 #[derive(Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ValidationFile {
-    pub format: String,
-    pub format_version: u32,
+    pub(crate) format: String,
+    pub(crate) format_version: u32,
     /// The SHA-256 of the run's content; the file says nothing about later states of the run.
-    pub run_sha256: String,
+    pub(crate) run_sha256: String,
     /// The SHA-256 of all inputs of the result; empty if the run's own choice is unknown.
-    pub key: String,
+    pub(crate) key: String,
     /// The best robots of each task, best first, chosen as in the run's config.
-    pub robots: Vec<Validated>,
+    pub(crate) robots: Vec<Validated>,
     /// The robots chosen in other ways.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub others: Vec<Ranking>,
+    pub(crate) others: Vec<Ranking>,
 }
 
 /// Robots not chosen as in the run's config: from others, by more images, or another threshold.
@@ -54,9 +54,9 @@ pub(crate) struct ValidationFile {
 #[serde(deny_unknown_fields)]
 pub(crate) struct Ranking {
     /// The SHA-256 of everything that the result depends on.
-    pub key: String,
+    pub(crate) key: String,
     /// The best robots of each task, best first.
-    pub robots: Vec<Validated>,
+    pub(crate) robots: Vec<Validated>,
 }
 
 impl Validated {
@@ -97,7 +97,7 @@ impl Stored for ValidationFile {
 
 impl ValidationFile {
     /// Returns the robots that were chosen in the way that a key names.
-    pub fn of(&self, key: &str) -> Option<&[Validated]> {
+    pub(crate) fn of(&self, key: &str) -> Option<&[Validated]> {
         match self.key == key {
             true => Some(&self.robots),
             false => self.others.iter().find(|other| other.key == key).map(|other| other.robots.as_slice()),
@@ -108,7 +108,7 @@ impl ValidationFile {
     ///
     /// # Errors
     /// Returns an error if it cannot be read.
-    pub fn read(path: &Path) -> Result<Option<Self>, Error> {
+    pub(crate) fn read(path: &Path) -> Result<Option<Self>, Error> {
         if !exists(path) {
             return Ok(None);
         }

@@ -13,9 +13,9 @@ pub const THRESHOLD: f64 = 3.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
     /// Class of the image.
-    pub class: u8,
+    pub(crate) class: u8,
     /// Displacement to the right under it, in voxel lengths; `None` if not simulated yet.
-    pub displacement: Option<f64>,
+    pub(crate) displacement: Option<f64>,
 }
 
 pub(super) fn of_split(
@@ -42,7 +42,7 @@ impl Direction {
     }
 
     /// Returns its name in files: "left" or "right".
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Direction::Left => "left",
             Direction::Right => "right",
@@ -58,20 +58,20 @@ impl Direction {
 /// The direction in which group A should walk; group B should walk the other way. The training
 /// answers fix it before any test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Assignment {
+pub(crate) struct Assignment {
     /// The direction of group A.
-    pub a: Direction,
+    pub(crate) a: Direction,
 }
 
 impl Assignment {
     /// Returns the assignment under which a robot's training answers are fitter (A left in a tie).
-    pub fn from_training(split: &ClassSplit, fitness: Fitness, answers: &[Answer]) -> Self {
+    pub(crate) fn from_training(split: &ClassSplit, fitness: Fitness, answers: &[Answer]) -> Self {
         let (a_right, a_left) = fitness.of_assignments(of_split(split, answers));
         Assignment { a: if a_right > a_left { Direction::Right } else { Direction::Left } }
     }
 
     /// Returns the direction in which a group should walk.
-    pub fn expected(self, group: Group) -> Direction {
+    pub(crate) fn expected(self, group: Group) -> Direction {
         match (group, self.a) {
             (Group::A, way) => way,
             (Group::B, Direction::Left) => Direction::Right,
@@ -80,7 +80,7 @@ impl Assignment {
     }
 
     /// Returns a displacement's length in the correct direction; negative in the wrong one.
-    pub fn margin(self, group: Group, displacement: f64) -> f64 {
+    pub(crate) fn margin(self, group: Group, displacement: f64) -> f64 {
         match self.expected(group) {
             Direction::Right => displacement,
             Direction::Left => -displacement,
@@ -89,7 +89,7 @@ impl Assignment {
 
     /// Returns true if a displacement is the correct answer to an image of a group: farther than
     /// `threshold`, the correct way.
-    pub fn is_right(self, group: Group, displacement: f64, threshold: f64) -> bool {
+    pub(crate) fn is_right(self, group: Group, displacement: f64, threshold: f64) -> bool {
         Direction::of(displacement, threshold) == Some(self.expected(group))
     }
 }
@@ -110,28 +110,28 @@ pub(crate) fn is_correct(
 
 /// The classes that robots of a task name by walking left or right.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Readout {
+pub(crate) struct Readout {
     /// Classes named by walking left.
-    pub left: Vec<u8>,
+    pub(crate) left: Vec<u8>,
     /// Classes named by walking right.
-    pub right: Vec<u8>,
+    pub(crate) right: Vec<u8>,
 }
 
 /// The answer of a walk so far.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Reading {
+pub(crate) struct Reading {
     /// Displacement under the current image, voxel lengths, right positive.
-    pub moved: f64,
+    pub(crate) moved: f64,
     /// Direction of the walk; none if not farther than [`THRESHOLD`].
-    pub way: Option<&'static str>,
+    pub(crate) way: Option<&'static str>,
     /// Classes that this names; none for a body without a task.
-    pub says: Vec<u8>,
+    pub(crate) says: Vec<u8>,
 }
 
 impl Readout {
     /// Makes the judge of a task, given the direction of its first group; none if every class
     /// should walk the same way.
-    pub fn of(split: &ClassSplit, assignment: Assignment) -> Option<Self> {
+    pub(crate) fn of(split: &ClassSplit, assignment: Assignment) -> Option<Self> {
         if split.is_same_way() {
             return None;
         }
@@ -144,7 +144,7 @@ impl Readout {
 }
 
 /// Returns the answer of a displacement, which names classes only if there is a judge.
-pub fn answer(readout: Option<&Readout>, moved: f64) -> Reading {
+pub(crate) fn answer(readout: Option<&Readout>, moved: f64) -> Reading {
     let way = Direction::of(moved, THRESHOLD);
     let says = match (readout, way) {
         (Some(readout), Some(Direction::Left)) => readout.left.clone(),
@@ -158,7 +158,7 @@ pub fn answer(readout: Option<&Readout>, moved: f64) -> Reading {
 /// Returns the answer in words: "says 0", "says 1 or 2", or nothing while it names no class. With
 /// `over`, the walk has ended: "says 0: correct" or "says 0: wrong" if the image's `class` is one
 /// of the task's, and "undecided" if it names no class. Empty without a judge.
-pub fn verdict(readout: Option<&Readout>, moved: f64, class: u8, over: bool) -> String {
+pub(crate) fn verdict(readout: Option<&Readout>, moved: f64, class: u8, over: bool) -> String {
     let Some(readout) = readout else { return String::new() };
     let says = answer(Some(readout), moved).says;
     let classes = says.iter().map(u8::to_string).collect::<Vec<_>>().join(" or ");

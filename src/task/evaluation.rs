@@ -47,16 +47,7 @@ pub enum Outcome {
     Stopped(Vec<Option<f64>>),
 }
 
-impl Outcome {
-    /// Returns the displacements as far as known, one per image; `None` if a rollout was unstable.
-    pub fn known(&self) -> Option<Vec<Option<f64>>> {
-        match self {
-            Outcome::Walked(displacements) => Some(displacements.iter().copied().map(Some).collect()),
-            Outcome::Stopped(known) => Some(known.clone()),
-            Outcome::Unstable(_) => None,
-        }
-    }
-}
+impl Outcome {}
 
 /// An outcome and the simulation it took. A *showing* is one image for one robot: a fresh rollout,
 /// or one phase of a sequential one.
@@ -73,7 +64,7 @@ pub struct Evaluation {
 }
 
 /// A predicate of a robot's displacements so far.
-pub type MayWin<'a> = dyn Fn(&[Option<f64>]) -> bool + Sync + Send + 'a;
+pub(crate) type MayWin<'a> = dyn Fn(&[Option<f64>]) -> bool + Sync + Send + 'a;
 
 /// A body to be evaluated.
 pub struct Job<'a> {
@@ -154,7 +145,7 @@ pub fn fresh_rollouts(
 /// Acts as [`fresh_rollouts`], but keeps what was completed before `stop` was set. Returns the
 /// displacements of the first images, the number simulated, and an error if it was stopped. The
 /// other images, simulated later, complete them with the same bits.
-pub fn fresh_rollouts_so_far(
+pub(crate) fn fresh_rollouts_so_far(
     body: &Body,
     images: &[Grid<f64>],
     conditions: &[Condition],
@@ -663,8 +654,9 @@ mod tests {
             known[0].is_none()
         };
         let evaluation = run(&CALM, RolloutMode::Fresh, Savings::default(), &[3, 4], Box::new(may_win));
-        let all = run(&CALM, RolloutMode::Fresh, Savings::default(), &[], Box::new(|_| true)).outcome.known();
-        let mut known = all.expect("all images are shown");
+        let all = run(&CALM, RolloutMode::Fresh, Savings::default(), &[], Box::new(|_| true)).outcome;
+        let Outcome::Walked(all) = all else { panic!("all images are shown") };
+        let mut known: Vec<Option<f64>> = all.into_iter().map(Some).collect();
         known[2] = None;
         let outcome = Outcome::Stopped(known);
         assert_eq!(evaluation, Evaluation { outcome, simulated: 2, shared: 2, stopped: 1 });

@@ -19,7 +19,7 @@ pub(crate) const LEAST_IMAGES: usize = 8;
 /// Margin at which an answer is as good as can be, for [`Fitness::MeanClipped`] \[voxel lengths\].
 /// With less, a small change flips many answers; with more, bodies that walk far count more than
 /// bodies that are correct.
-pub const ENOUGH: f64 = 10.0;
+pub(crate) const ENOUGH: f64 = 10.0;
 
 /// Larger than any rounding error of a sum over images.
 const SLACK: f64 = 1e-9;
@@ -57,7 +57,7 @@ pub enum Fitness {
 
 impl Fitness {
     /// Returns its unit; a mean of clipped margins has none.
-    pub fn unit(self) -> Option<&'static str> {
+    pub(crate) fn unit(self) -> Option<&'static str> {
         match self {
             Fitness::Min | Fitness::Response => Some("voxel lengths"),
             Fitness::MeanClipped => None,
@@ -110,7 +110,7 @@ impl Fitness {
 }
 
 /// Returns a margin as it counts in a mean: divided by ten voxel lengths and clipped to −1 … 1.
-pub fn clipped_margin(margin: f64) -> f64 {
+pub(crate) fn clipped_margin(margin: f64) -> f64 {
     (margin / ENOUGH).clamp(-1.0, 1.0)
 }
 
@@ -119,7 +119,7 @@ pub fn clipped_margin(margin: f64) -> f64 {
 const OFFSET_COST: f64 = 0.125;
 
 /// Returns the response of the known pairs of displacements; `None` if no condition has two.
-pub fn response_so_far(displacements: impl Iterator<Item = Option<f64>>) -> Option<f64> {
+pub(crate) fn response_so_far(displacements: impl Iterator<Item = Option<f64>>) -> Option<f64> {
     let known: Vec<f64> = displacements.map_while(|displacement| displacement).collect();
     let pairs = known.chunks_exact(2);
     let (odd, even): (Vec<f64>, Vec<f64>) =

@@ -20,7 +20,7 @@ pub struct ClassSplit {
 
 impl ClassSplit {
     /// Returns the classes of a group.
-    pub fn classes(&self, group: Group) -> &[u8] {
+    pub(crate) fn classes(&self, group: Group) -> &[u8] {
         match group {
             Group::A => &self.a,
             Group::B => &self.b,
@@ -28,13 +28,13 @@ impl ClassSplit {
     }
 
     /// Returns the group of a class, `None` if it belongs to neither.
-    pub fn group(&self, class: u8) -> Option<Group> {
+    pub(crate) fn group(&self, class: u8) -> Option<Group> {
         [Group::A, Group::B].into_iter().find(|g| self.classes(*g).contains(&class))
     }
 
     /// Returns true if every class is in one group: no recognition task, but the bin of robots that
     /// always walk one way.
-    pub fn is_same_way(&self) -> bool {
+    pub(crate) fn is_same_way(&self) -> bool {
         self.b.is_empty()
     }
 
@@ -48,14 +48,14 @@ impl ClassSplit {
 
     /// Returns true if a name from a file is its name. Older files lack the comma at the end:
     /// there, a name means the one of its run's groups that has it.
-    pub fn is_called(&self, name: &str) -> bool {
+    pub(crate) fn is_called(&self, name: &str) -> bool {
         let own = self.name();
         own == name || own.strip_suffix(',') == Some(name)
     }
 }
 
 /// Returns the name of two groups of classes with a separator: `0|123`, or `0v123` in file names.
-pub fn groups_text(groups: [&[u8]; 2], between: &str) -> String {
+pub(crate) fn groups_text(groups: [&[u8]; 2], between: &str) -> String {
     let are_digits = groups.iter().copied().flatten().all(|class| *class < 10);
     let mut text = joined(groups, between, if are_digits { "" } else { "," });
     if !are_digits && !text.contains(',') {
@@ -78,7 +78,7 @@ pub struct Groups {
 
 impl Groups {
     /// Returns the classes of both groups.
-    pub fn classes(&self) -> &[Vec<u8>; 2] {
+    pub(crate) fn classes(&self) -> &[Vec<u8>; 2] {
         &self.classes
     }
 
@@ -87,7 +87,7 @@ impl Groups {
     ///
     /// # Errors
     /// Returns [`Ambiguous`] if it may.
-    pub fn check_among(&self, there: &[u8]) -> Result<(), Ambiguous> {
+    pub(crate) fn check_among(&self, there: &[u8]) -> Result<(), Ambiguous> {
         let number = |group: &Vec<u8>| -> Option<u8> {
             let digits: String = group.iter().map(u8::to_string).collect();
             let number = digits.parse().ok().filter(|number| there.contains(number));
@@ -111,7 +111,7 @@ impl Groups {
 #[error(
     "groups {text}: the data have a class {class}; expected \"{lone}\" for it, or \"{separate}\" for its digits"
 )]
-pub struct Ambiguous {
+pub(crate) struct Ambiguous {
     text: String,
     class: u8,
     lone: String,
@@ -159,7 +159,7 @@ impl FromStr for Groups {
 
 /// Returns the correct direction and the weight of images with these labels: 1, right, for the
 /// first group and −1, left, for every other class. Either side weighs one half in total.
-pub fn balanced<'a>(
+pub(crate) fn balanced<'a>(
     labels: impl Iterator<Item = u8> + Clone + 'a,
     first: &'a [u8],
 ) -> impl Iterator<Item = (f64, f64)> + 'a {
@@ -181,11 +181,11 @@ pub struct Grouping {
 }
 
 /// Most classes to split in all ways: ten have 511 splits.
-pub const MAX_CLASSES: usize = 10;
+pub(crate) const MAX_CLASSES: usize = 10;
 
 /// The reason why classes cannot be grouped.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum GroupingError {
+pub(crate) enum GroupingError {
     /// A group has no classes.
     #[error("expected two groups with at least one class each, as in [[0], [1, 2]]; one is empty")]
     EmptyGroup,
@@ -202,7 +202,7 @@ impl Grouping {
     ///
     /// # Errors
     /// Returns a [`GroupingError`] if a group is empty or a class occurs twice.
-    pub fn two_groups(a: &[u8], b: &[u8]) -> Result<Self, GroupingError> {
+    pub(crate) fn two_groups(a: &[u8], b: &[u8]) -> Result<Self, GroupingError> {
         if a.is_empty() || b.is_empty() {
             return Err(GroupingError::EmptyGroup);
         }
@@ -218,7 +218,7 @@ impl Grouping {
     ///
     /// # Errors
     /// Returns a [`GroupingError`] for repeated classes, or for other than 2 to [`MAX_CLASSES`].
-    pub fn all_splits(classes: &[u8], same_way_bin: bool) -> Result<Self, GroupingError> {
+    pub(crate) fn all_splits(classes: &[u8], same_way_bin: bool) -> Result<Self, GroupingError> {
         let k = classes.len();
         if !(2..=MAX_CLASSES).contains(&k) {
             return Err(GroupingError::Classes(k));
@@ -246,7 +246,7 @@ impl Grouping {
     }
 
     /// Returns the rule that combines answers to several images.
-    pub fn fitness(&self) -> Fitness {
+    pub(crate) fn fitness(&self) -> Fitness {
         self.fitness
     }
 
@@ -256,12 +256,12 @@ impl Grouping {
     }
 
     /// Returns true if "all the same way" is a task.
-    pub fn has_same_way_bin(&self) -> bool {
+    pub(crate) fn has_same_way_bin(&self) -> bool {
         self.tasks.iter().any(ClassSplit::is_same_way)
     }
 
     /// Returns true if every way to split the classes is a task.
-    pub fn has_all_splits(&self) -> bool {
+    pub(crate) fn has_all_splits(&self) -> bool {
         let classes = self.tasks.first().map_or(0, |s| s.a.len() + s.b.len());
         let splits = self.tasks.iter().filter(|s| !s.is_same_way()).count();
         (2..=MAX_CLASSES).contains(&classes) && splits == (1 << (classes - 1)) - 1

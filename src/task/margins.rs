@@ -33,7 +33,7 @@ enum Written {
 
 impl Margins {
     /// Makes equal margins at every edge.
-    pub fn same(margin: usize) -> Self {
+    pub(crate) fn same(margin: usize) -> Self {
         Margins { top: margin, right: margin, bottom: margin, left: margin }
     }
 
@@ -43,20 +43,20 @@ impl Margins {
     }
 
     /// Returns the height and width that remain of an image of this size; `None` if nothing does.
-    pub fn left_of(&self, [height, width]: [usize; 2]) -> Option<[usize; 2]> {
+    pub(crate) fn left_of(&self, [height, width]: [usize; 2]) -> Option<[usize; 2]> {
         let left =
             |side: usize, a: usize, b: usize| side.checked_sub(a.checked_add(b)?).filter(|left| *left > 0);
         Some([left(height, self.top, self.bottom)?, left(width, self.left, self.right)?])
     }
 
     /// Returns the part that remains of an image; `None` if nothing does.
-    pub fn cut<T: Clone>(&self, image: &Grid<T>) -> Option<Grid<T>> {
+    pub(crate) fn cut<T: Clone>(&self, image: &Grid<T>) -> Option<Grid<T>> {
         let [rows, columns] = self.left_of([image.height(), image.width()])?;
         Some(Grid::from_fn(rows, columns, |r, c| image[(r + self.top, c + self.left)].clone()))
     }
 
     /// Returns the smaller margin at each edge, so that the remaining part contains those of both.
-    pub fn least(&self, other: &Margins) -> Self {
+    pub(crate) fn least(&self, other: &Margins) -> Self {
         Margins {
             top: self.top.min(other.top),
             right: self.right.min(other.right),

@@ -3,10 +3,10 @@
 pub mod answer;
 pub mod evaluation;
 pub mod fitness;
-pub mod grouping;
+pub(crate) mod grouping;
 pub mod margins;
-pub mod objective;
-pub mod perturbation;
+pub(crate) mod objective;
+pub(crate) mod perturbation;
 pub mod protocol;
 pub mod recording;
 pub mod rollout;

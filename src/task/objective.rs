@@ -11,7 +11,7 @@ use std::borrow::Cow;
 
 /// The objective of evolution: which body is simulated for a candidate, under which images, and what
 /// its fitness counts. The loop of MAP-Elites is the same for all of them.
-pub trait Objective: Sync {
+pub(crate) trait Objective: Sync {
     /// Returns the images and conditions of a run's evaluations, given its training images as
     /// sensors see them (each H × W, in \[0, 1\]).
     fn prepare(
@@ -45,7 +45,7 @@ pub trait Objective: Sync {
 }
 
 /// Recognition: bodies as they are walk under the training images.
-pub struct Recognition;
+pub(crate) struct Recognition;
 
 impl Objective for Recognition {
     fn prepare(&self, stimuli: Vec<Grid<f64>>, _: &Physics, _: u64) -> (Vec<Grid<f64>>, Vec<Condition>) {

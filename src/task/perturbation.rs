@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 /// The kind of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum PerturbationKind {
+pub(crate) enum PerturbationKind {
     /// The robot starts above the ground, and first touches it in another way; also in another
     /// column.
     Start,
@@ -44,7 +44,7 @@ pub enum PerturbationKind {
 
 impl PerturbationKind {
     /// All kinds, in the order of a report.
-    pub const ALL: [PerturbationKind; 10] = [
+    pub(crate) const ALL: [PerturbationKind; 10] = [
         PerturbationKind::Start,
         PerturbationKind::Mirror,
         PerturbationKind::TimeStep,
@@ -60,12 +60,12 @@ impl PerturbationKind {
     /// Returns true if it changes the simulated world. The others change only how that is computed,
     /// or how images are presented: a robot that fails under those exploits something other than
     /// body and image.
-    pub fn is_of_the_world(self) -> bool {
+    pub(crate) fn is_of_the_world(self) -> bool {
         self >= PerturbationKind::Stiffness
     }
 
     /// Returns its name for people.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             PerturbationKind::Start => "start",
             PerturbationKind::Mirror => "ties (mirror image)",
@@ -84,19 +84,19 @@ impl PerturbationKind {
 /// The sizes of an audit's changes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct Sizes {
+pub(crate) struct Sizes {
     /// Rows by which the start is raised, one rollout each. Default 1 and 2.
-    pub start: Vec<u32>,
+    pub(crate) start: Vec<u32>,
     /// Divisors of the time step, one rollout each. Default 2 and 4.
-    pub time_step: Vec<u32>,
+    pub(crate) time_step: Vec<u32>,
     /// Fraction by which stiffness, friction and gravity are raised and lowered. Default 0.05.
-    pub share: f64,
+    pub(crate) share: f64,
     /// Number of rollouts with a changed pixel in every image. Default 3.
-    pub pixels: u32,
+    pub(crate) pixels: u32,
     /// Fewest sensors of a robot whose pixels are changed: else one pixel is no noise. Default 10.
-    pub least_sensors: usize,
+    pub(crate) least_sensors: usize,
     /// Seed of the pixels. Default 1.
-    pub seed: u64,
+    pub(crate) seed: u64,
 }
 
 impl Default for Sizes {
@@ -107,25 +107,25 @@ impl Default for Sizes {
 
 /// A robot and the settings of its simulation.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PerturbedSetting {
+pub(crate) struct PerturbedSetting {
     /// Its body.
-    pub body: Body,
+    pub(crate) body: Body,
     /// The simulator's constants.
-    pub physics: Physics,
+    pub(crate) physics: Physics,
     /// The presentation of images.
-    pub protocol: Protocol,
+    pub(crate) protocol: Protocol,
     /// The stimulus of each image.
-    pub stimuli: Vec<Grid<f64>>,
+    pub(crate) stimuli: Vec<Grid<f64>>,
 }
 
 /// Perturbations that the images of a training take in turn; keys of `train.perturbations`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct ByTurns {
+pub(crate) struct ByTurns {
     /// Most rows by which the start is raised. Default 2.
-    pub start: u32,
+    pub(crate) start: u32,
     /// True if half of the images are simulated without length limits. Default true.
-    pub length_limits: bool,
+    pub(crate) length_limits: bool,
 }
 
 impl Default for ByTurns {
@@ -135,18 +135,18 @@ impl Default for ByTurns {
 }
 
 /// The perturbations of one rollout; often none.
-pub type Condition = Vec<Perturbation>;
+pub(crate) type Condition = Vec<Perturbation>;
 
 impl ByTurns {
     /// Returns every condition once: starts raised by 0 up to the most rows, then without limits.
-    pub fn conditions(&self) -> impl Iterator<Item = Condition> {
+    pub(crate) fn conditions(&self) -> impl Iterator<Item = Condition> {
         let ByTurns { start, length_limits } = *self;
         let one = move |without_limits: bool| (0..=start).map(move |rows| condition(rows, without_limits));
         one(false).chain(length_limits.then(|| one(true)).into_iter().flatten())
     }
 
     /// Returns the conditions of images of these classes, which take turns within each class.
-    pub fn of(&self, classes: impl Iterator<Item = u8>) -> Vec<Condition> {
+    pub(crate) fn of(&self, classes: impl Iterator<Item = u8>) -> Vec<Condition> {
         let starts = u64::from(self.start) + 1;
         let mut turns = [0_u64; u8::MAX as usize + 1];
         let condition = |class: u8| {
@@ -159,12 +159,12 @@ impl ByTurns {
 }
 
 /// Number of conditions of [`of_response`].
-pub const CONDITIONS_OF_RESPONSE: usize = 2;
+pub(crate) const CONDITIONS_OF_RESPONSE: usize = 2;
 
 /// Returns the conditions under which the response of gaits is measured during evolution, in turn:
 /// the default; and a start raised by a row, without length limits. So luck at the first touch of
 /// the ground, or at a limit, does not count as a response.
-pub fn of_response() -> [Condition; CONDITIONS_OF_RESPONSE] {
+pub(crate) fn of_response() -> [Condition; CONDITIONS_OF_RESPONSE] {
     [condition(0, false), condition(1, true)]
 }
 
@@ -287,7 +287,7 @@ impl TryFrom<Stored> for Perturbation {
 
 impl Perturbation {
     /// Returns all changes of these sizes that apply to body and protocol, in a report's order.
-    pub fn all(sizes: &Sizes, body: &Body, rollout: RolloutMode) -> Vec<Self> {
+    pub(crate) fn all(sizes: &Sizes, body: &Body, rollout: RolloutMode) -> Vec<Self> {
         let sees = body.counts().sensor >= sizes.least_sensors;
         let factors = [1.0 - sizes.share, 1.0 + sizes.share];
         let of = |kind| -> Vec<Self> {
@@ -322,7 +322,7 @@ impl Perturbation {
     }
 
     /// Returns the kind of the change.
-    pub fn kind(&self) -> PerturbationKind {
+    pub(crate) fn kind(&self) -> PerturbationKind {
         match self {
             Perturbation::Start { .. } => PerturbationKind::Start,
             Perturbation::Mirror => PerturbationKind::Mirror,
@@ -338,7 +338,7 @@ impl Perturbation {
     }
 
     /// Returns its name for people, such as "time step / 4".
-    pub fn name(&self) -> String {
+    pub(crate) fn name(&self) -> String {
         let kind = self.kind().name();
         match self {
             Perturbation::Start { rows } => format!("{kind} raised by {rows}"),
@@ -360,13 +360,13 @@ impl Perturbation {
 
     /// Returns false if instability does not count against the robot: without limits. Every
     /// material has a limit, and a body that needs one does not exploit it.
-    pub fn counts_if_unstable(&self) -> bool {
+    pub(crate) fn counts_if_unstable(&self) -> bool {
         *self != Perturbation::NoLengthLimits
     }
 
     /// Returns the changed setting. Compare displacements under it only after
     /// [`Perturbation::undo`].
-    pub fn apply(&self, setting: &PerturbedSetting) -> PerturbedSetting {
+    pub(crate) fn apply(&self, setting: &PerturbedSetting) -> PerturbedSetting {
         let PerturbedSetting { body, physics, protocol, stimuli } = setting;
         let stimulus = |(image, stimulus)| self.stimulus(body, stimulus, image as u64);
         let mut stimuli: Vec<Grid<f64>> = stimuli.iter().enumerate().map(stimulus).collect();
@@ -382,12 +382,12 @@ impl Perturbation {
     }
 
     /// Returns the changed body.
-    pub fn body(&self, body: &Body) -> Body {
+    pub(crate) fn body(&self, body: &Body) -> Body {
         if *self == Perturbation::Mirror { body.mirrored() } else { body.clone() }
     }
 
     /// Returns the changed constants of the simulator.
-    pub fn physics(&self, physics: &Physics) -> Physics {
+    pub(crate) fn physics(&self, physics: &Physics) -> Physics {
         match *self {
             Perturbation::TimeStep { divisor } => physics.refined(divisor),
             Perturbation::NoLengthLimits => physics.without_limits(),
@@ -410,7 +410,7 @@ impl Perturbation {
     }
 
     /// Returns the changed presentation of images.
-    pub fn protocol(&self, protocol: &Protocol) -> Protocol {
+    pub(crate) fn protocol(&self, protocol: &Protocol) -> Protocol {
         match *self {
             Perturbation::Start { rows } => Protocol {
                 start_row: protocol.start_row.saturating_add(rows),
@@ -422,7 +422,7 @@ impl Perturbation {
     }
 
     /// Returns the changed stimulus of the image with this number, for the unchanged body.
-    pub fn stimulus(&self, body: &Body, stimulus: &Grid<f64>, image: u64) -> Grid<f64> {
+    pub(crate) fn stimulus(&self, body: &Body, stimulus: &Grid<f64>, image: u64) -> Grid<f64> {
         match *self {
             Perturbation::Mirror => stimulus.mirrored(),
             Perturbation::Pixel { draw, seed } => with_pixel_inverted(body, stimulus, (seed, draw, image)),
@@ -432,7 +432,7 @@ impl Perturbation {
 
     /// Returns displacements in the unperturbed frame: a mirrored walk is mirrored back, and the
     /// order is the unchanged one.
-    pub fn undo(&self, mut displacements: Vec<f64>) -> Vec<f64> {
+    pub(crate) fn undo(&self, mut displacements: Vec<f64>) -> Vec<f64> {
         match self {
             Perturbation::Mirror => displacements.iter_mut().for_each(|d| *d = -*d),
             Perturbation::Order => displacements.reverse(),

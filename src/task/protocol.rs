@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Farthest start column either way \[voxels\]: world coordinates stay exact to far below a voxel.
-pub const MAX_COLUMN: i64 = 1_000_000;
+pub(crate) const MAX_COLUMN: i64 = 1_000_000;
 
 /// Most control steps of an image or a scenario: twenty thousand actuation cycles of the paper's.
 pub const MAX_STEPS: u32 = 1_000_000;

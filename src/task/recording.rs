@@ -19,9 +19,9 @@ pub struct LabelledStimulus {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Phase {
     /// Index in [`Recording::frames`] of the frame before the phase's first control step.
-    pub first_frame: usize,
+    pub(crate) first_frame: usize,
     /// The image.
-    pub seen: LabelledStimulus,
+    pub(crate) seen: LabelledStimulus,
     /// X displacement of the centre of mass over the phase, voxel lengths, right positive.
     pub displacement: f64,
 }
@@ -52,9 +52,9 @@ pub struct VoxelCorners {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
     /// The robot's id or name.
-    pub robot: String,
+    pub(crate) robot: String,
     /// Its body.
-    pub body: Body,
+    pub(crate) body: Body,
     /// Its voxels with their corners, row-major; fixed for the rollout.
     pub voxels: Vec<VoxelCorners>,
     /// The phases in order, at least one; the first starts at frame 0.
@@ -62,9 +62,9 @@ pub struct Recording {
     /// All frames.
     pub frames: Vec<Frame>,
     /// Control steps per actuation cycle (50).
-    pub cycle: usize,
+    pub(crate) cycle: usize,
     /// True if the rollout ended early as unstable.
-    pub unstable: bool,
+    pub(crate) unstable: bool,
     /// Meaning of the robot's walks; none for a robot without a task.
-    pub judge: Option<Readout>,
+    pub(crate) judge: Option<Readout>,
 }

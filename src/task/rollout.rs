@@ -53,7 +53,7 @@ impl<'a> Rollout<'a> {
     ///
     /// # Errors
     /// Returns a [`StepError`] if it was stopped, or if the rollout became unstable.
-    pub fn show_unless(&mut self, stimulus: &Grid<f64>, stop: &AtomicBool) -> Result<f64, StepError> {
+    pub(crate) fn show_unless(&mut self, stimulus: &Grid<f64>, stop: &AtomicBool) -> Result<f64, StepError> {
         self.look_at(stimulus);
         for _ in 0..self.protocol.control_steps {
             self.step_unless(stop)?;
@@ -62,7 +62,7 @@ impl<'a> Rollout<'a> {
     }
 
     /// Sets the image until the next call, and measures displacement from here.
-    pub fn look_at(&mut self, stimulus: &Grid<f64>) {
+    pub(crate) fn look_at(&mut self, stimulus: &Grid<f64>) {
         self.world.set_stimulus(stimulus);
         self.begin = self.world.centre_of_mass()[0];
     }
@@ -71,7 +71,7 @@ impl<'a> Rollout<'a> {
     ///
     /// # Errors
     /// Returns [`Unstable`] if the rollout ends in this step.
-    pub fn step(&mut self) -> Result<(), Unstable> {
+    pub(crate) fn step(&mut self) -> Result<(), Unstable> {
         self.world.step()
     }
 
@@ -79,17 +79,17 @@ impl<'a> Rollout<'a> {
     ///
     /// # Errors
     /// Returns a [`StepError`] if it was stopped, or if the rollout became unstable.
-    pub fn step_unless(&mut self, stop: &AtomicBool) -> Result<(), StepError> {
+    pub(crate) fn step_unless(&mut self, stop: &AtomicBool) -> Result<(), StepError> {
         self.world.step_unless(stop)
     }
 
     /// Returns the centre of mass's x displacement under this image, voxel lengths, right positive.
-    pub fn moved(&self) -> f64 {
+    pub(crate) fn moved(&self) -> f64 {
         voxel_lengths(self.world.centre_of_mass()[0] - self.begin, self.physics())
     }
 
     /// Returns the current frame, for pictures.
-    pub fn frame(&self) -> Frame {
+    pub(crate) fn frame(&self) -> Frame {
         let physics = self.physics();
         let ground = f64::from(physics.ground_row) * physics.cell_size;
         let place = |[x, y]: [f64; 2]| [voxel_lengths(x, physics), voxel_lengths(y - ground, physics)];
@@ -97,13 +97,13 @@ impl<'a> Rollout<'a> {
     }
 
     /// Returns the voxels with their corners, as indices into a [`Rollout::frame`]'s points.
-    pub fn voxels(&self) -> Vec<VoxelCorners> {
+    pub(crate) fn voxels(&self) -> Vec<VoxelCorners> {
         let corner = |((row, column), corners)| VoxelCorners { row, column, corners };
         self.world.voxels().map(corner).collect()
     }
 
     /// Returns to the initial state: a fresh rollout.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         self.world.reset();
     }
 }
@@ -155,7 +155,7 @@ pub fn fresh_rollouts_of(
 ///
 /// # Errors
 /// Returns a [`StepError`] if it was stopped, or if a rollout became unstable.
-pub fn walk(
+pub(crate) fn walk(
     system: &Arc<System>,
     protocol: &Protocol,
     stimuli: &[Grid<f64>],
@@ -178,7 +178,7 @@ pub fn walk(
 
 /// Returns for each stimulus the index of the first one that gives the body's sensors the same
 /// pixels: those share a rollout.
-pub fn same_to_sensors(body: &Body, stimuli: &[&Grid<f64>]) -> Vec<usize> {
+pub(crate) fn same_to_sensors(body: &Body, stimuli: &[&Grid<f64>]) -> Vec<usize> {
     let sensors = || body.voxels().iter().filter(|(_, m)| m.is_sensor()).map(|(place, _)| place);
     let mut first = std::collections::HashMap::new();
     let seen = |stimulus: &Grid<f64>| {

@@ -13,11 +13,11 @@ use crate::task::grouping::{ClassSplit, Grouping};
 
 /// The task that a robot performs, and its fitness there.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Score {
+pub(crate) struct Score {
     /// Index in [`Grouping::tasks`].
-    pub task: usize,
+    pub(crate) task: usize,
     /// See [`Fitness`]. The smallest margin is in voxel lengths, above 0 if all is correct.
-    pub fitness: f64,
+    pub(crate) fitness: f64,
 }
 
 /// Returns the fitness on two groups, in voxel lengths: the smallest margin under the better of
@@ -29,7 +29,7 @@ pub fn two_group_fitness(answers: &[(Group, f64)]) -> f64 {
 impl Grouping {
     /// Returns the fitness on a task, or an **upper bound** of it while some answers are missing.
     /// Images of classes in neither of its groups do not count.
-    pub fn fitness_on(&self, split: &ClassSplit, answers: &[Answer]) -> f64 {
+    pub(crate) fn fitness_on(&self, split: &ClassSplit, answers: &[Answer]) -> f64 {
         better(self.fitness().of_assignments(of_split(split, answers)))
     }
 
@@ -39,7 +39,7 @@ impl Grouping {
     /// With one image per class and the smallest margin this is the paper's rule: fitness is min
     /// |d|, and the signs determine the task. A robot that walks the same way for all classes goes
     /// to that bin with min |d| if there is one, else to its best split, with a negative fitness.
-    pub fn score(&self, answers: &[Answer]) -> Score {
+    pub(crate) fn score(&self, answers: &[Answer]) -> Score {
         let mut best = Score { task: 0, fitness: f64::NEG_INFINITY };
         for (task, split) in self.tasks().iter().enumerate() {
             let fitness = self.fitness_on(split, answers);
@@ -70,7 +70,7 @@ impl Grouping {
     /// Returns the indices of the answers from the worst to the best on the robot's task. Both
     /// groups take turns, since a robot that always walks one way is right on all of a group.
     /// Images of classes in neither group, or without an answer, are left out.
-    pub fn hardest_first(&self, answers: &[Answer]) -> Vec<usize> {
+    pub(crate) fn hardest_first(&self, answers: &[Answer]) -> Vec<usize> {
         let split = &self.tasks()[self.score(answers).task];
         let assignment = Assignment::from_training(split, self.fitness(), answers);
         let mut margins: Vec<(f64, Group, usize)> = (answers.iter().zip(0..))

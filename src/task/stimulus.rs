@@ -64,7 +64,7 @@ impl Default for StimulusParams {
 impl StimulusParams {
     /// Combines the parameters of several bodies: the first one's, with the least of all margins;
     /// reduced by areas if these are not its own. `None` for no body.
-    pub fn together(all: impl IntoIterator<Item = StimulusParams>) -> Option<Self> {
+    pub(crate) fn together(all: impl IntoIterator<Item = StimulusParams>) -> Option<Self> {
         let least = |first: Self, other: Self| match first.margin.least(&other.margin) {
             own if own == first.margin => first,
             margin => StimulusParams { margin, reduction: Reduction::Area, ..first },
@@ -73,7 +73,7 @@ impl StimulusParams {
     }
 
     /// Describes the part of an image of this height and width that a body covers.
-    pub fn part(&self, [height, width]: [usize; 2]) -> String {
+    pub(crate) fn part(&self, [height, width]: [usize; 2]) -> String {
         let whole = format!("{height} × {width} pixels");
         match (self.margin.is_none(), self.margin.left_of([height, width])) {
             (true, _) => format!("all {whole}"),
@@ -88,7 +88,7 @@ impl StimulusParams {
     ///
     /// # Errors
     /// Returns [`StimulusError::Level`] if it is below 0, 1 or more, or NaN.
-    pub fn validate(&self) -> Result<(), StimulusError> {
+    pub(crate) fn validate(&self) -> Result<(), StimulusError> {
         (0.0..1.0).contains(&self.level).then_some(()).ok_or(StimulusError::Level(self.level))
     }
 }
@@ -215,7 +215,7 @@ fn strided(image: &Grid<u8>, height: usize, width: usize) -> Result<Grid<f64>, S
 /// Reduces the image to a grid of another size by area-weighted means, 0 … 255. In units of
 /// 1/height of a pixel, a voxel is `image.height()` tall and a pixel `height`: all overlaps are
 /// whole numbers, and the division per voxel is the only rounding.
-pub fn averaged(image: &Grid<u8>, height: usize, width: usize) -> Grid<f64> {
+pub(crate) fn averaged(image: &Grid<u8>, height: usize, width: usize) -> Grid<f64> {
     let overlap = |voxel: usize, voxel_side: usize, pixel: usize, pixel_side: usize| {
         let end = ((voxel + 1) * voxel_side).min((pixel + 1) * pixel_side);
         end - (voxel * voxel_side).max(pixel * pixel_side)

@@ -180,7 +180,7 @@ pub(crate) fn check_groups(groups: &Groups, dataset: &Dataset) -> Result<(), Err
 ///
 /// # Errors
 /// Returns an error if the config or the available images do not allow it.
-pub fn check(evolved: &Config, groups: &[Vec<u8>; 2], whereabouts: &Whereabouts) -> Result<(), Error> {
+pub(crate) fn check(evolved: &Config, groups: &[Vec<u8>; 2], whereabouts: &Whereabouts) -> Result<(), Error> {
     let config = config_of(evolved, groups, None, &[])?;
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;
     with_images(config, &TrainingImages::indices(evolved, &dataset)?, &dataset, &Session::default())

@@ -6,11 +6,11 @@
 mod config;
 pub(crate) mod gaits;
 pub(crate) mod log;
-pub mod race;
+pub(crate) mod race;
 pub(crate) mod rollouts;
-pub mod rounds;
+pub(crate) mod rounds;
 pub(crate) mod trainer;
 pub(crate) mod window;
 
-pub use config::check;
+pub(crate) use config::check;
 pub(crate) use config::{check_groups, config_of, sized, with_images};

@@ -53,21 +53,21 @@ const DRAWS: usize = 1000;
 
 /// A training image of a refinement.
 #[derive(Clone, Debug)]
-pub struct WeightedImage {
+pub(crate) struct WeightedImage {
     /// Pixels at the voxels.
-    pub stimulus: Grid<f64>,
+    pub(crate) stimulus: Grid<f64>,
     /// Number of its condition.
-    pub condition: usize,
+    pub(crate) condition: usize,
     /// Correct direction: 1 right, −1 left.
-    pub right: f64,
+    pub(crate) right: f64,
     /// Weight in the fitness.
-    pub weight: f64,
+    pub(crate) weight: f64,
 }
 
 impl WeightedImage {
     /// Prepares images for a robot whose first group walks to this side: 1 right, −1 left. Both
     /// groups have the same total weight, however many images each has.
-    pub fn all(images: &[&Image], side: f64) -> Vec<Self> {
+    pub(crate) fn all(images: &[&Image], side: f64) -> Vec<Self> {
         let of =
             |right: f64| images.iter().filter(|image| image.example.right == right).count().max(1) as f64;
         let shown = |image: &&Image| WeightedImage {
@@ -82,21 +82,21 @@ impl WeightedImage {
 
 /// The result of a challenge.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Challenge {
+pub(crate) struct Challenge {
     /// Its number, from 1.
-    pub number: usize,
+    pub(crate) number: usize,
     /// True if the challenger has another gait than the champion.
-    pub other_gait: bool,
+    pub(crate) other_gait: bool,
     /// Number of images the challenger was evaluated on.
-    pub shown: usize,
+    pub(crate) shown: usize,
     /// The champion's fitness afterwards.
-    pub fitness: f64,
+    pub(crate) fitness: f64,
     /// True if the challenger became champion.
-    pub won: bool,
+    pub(crate) won: bool,
 }
 
 /// A champion, and the evidence from which challengers are proposed.
-pub struct Refinement<'a> {
+pub(crate) struct Refinement<'a> {
     images: Vec<WeightedImage>,
     physics: &'a Physics,
     min_muscles: usize,
@@ -117,7 +117,7 @@ impl<'a> Refinement<'a> {
     ///
     /// # Errors
     /// Returns the error of the rollouts.
-    pub fn new<R: Rollouts>(
+    pub(crate) fn new<R: Rollouts>(
         body: Body,
         images: Vec<WeightedImage>,
         (evidence, ridge): (Evidence, f64),
@@ -141,7 +141,7 @@ impl<'a> Refinement<'a> {
     }
 
     /// Returns the champion.
-    pub fn body(&self) -> &Body {
+    pub(crate) fn body(&self) -> &Body {
         &self.body
     }
 
@@ -149,7 +149,7 @@ impl<'a> Refinement<'a> {
     ///
     /// # Errors
     /// Returns the error of the rollouts.
-    pub fn show<R: Rollouts>(
+    pub(crate) fn show<R: Rollouts>(
         &mut self,
         images: Vec<WeightedImage>,
         rollouts: &mut R,
@@ -161,17 +161,17 @@ impl<'a> Refinement<'a> {
     }
 
     /// Returns the champion's displacement under each image \[voxel lengths\].
-    pub fn displacements(&self) -> &[f64] {
+    pub(crate) fn displacements(&self) -> &[f64] {
         &self.displacements
     }
 
     /// Returns the number of rollouts so far.
-    pub fn rollouts(&self) -> usize {
+    pub(crate) fn rollouts(&self) -> usize {
         self.rollouts
     }
 
     /// Returns the champion's fitness: the weighted mean clipped margin of its answers.
-    pub fn fitness(&self) -> f64 {
+    pub(crate) fn fitness(&self) -> f64 {
         let all: f64 = self.images.iter().map(|image| image.weight).sum();
         let scores = self.images.iter().zip(&self.displacements).map(|(image, d)| self.score(image, *d));
         scores.sum::<f64>() / all
@@ -185,7 +185,7 @@ impl<'a> Refinement<'a> {
     ///
     /// # Errors
     /// Returns the error of the rollouts.
-    pub fn challenge<R: Rollouts>(
+    pub(crate) fn challenge<R: Rollouts>(
         &mut self,
         challenger: Body,
         rollouts: &mut R,
@@ -231,7 +231,7 @@ impl<'a> Refinement<'a> {
     }
 
     /// Proposes a challenger.
-    pub fn challenger(&self) -> Body {
+    pub(crate) fn challenger(&self) -> Body {
         let mut random = self.random(Use::Challenger);
         if random.unit() < OTHER_GAITS {
             return self.other_gait(&mut random);

@@ -6,19 +6,19 @@ use crate::response::lesson::Example;
 
 /// A training image as a gait sees it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Image {
+pub(crate) struct Image {
     /// Pixels at the voxels.
-    pub stimulus: Grid<f64>,
+    pub(crate) stimulus: Grid<f64>,
     /// Its class.
-    pub class: u8,
+    pub(crate) class: u8,
     /// Its widths, its correct side and its weight.
-    pub example: Example,
+    pub(crate) example: Example,
     /// Number of its condition, from 0.
-    pub condition: usize,
+    pub(crate) condition: usize,
 }
 
 /// A simulator of designs.
-pub trait Rollouts {
+pub(crate) trait Rollouts {
     /// Error of a simulation: it was stopped, or a file could not be written.
     type Error;
     /// Returns the displacements of a body under stimuli and conditions \[voxel lengths\]; `None`

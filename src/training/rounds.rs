@@ -39,42 +39,42 @@ const CHALLENGERS_OF_A_SET: usize = 30;
 
 /// The settings of a training.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TrainingPlan {
+pub(crate) struct TrainingPlan {
     /// Seed of all random numbers.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Rounds that measure the response around a design; 0: the robot keeps its own design.
-    pub rounds: usize,
+    pub(crate) rounds: usize,
     /// Training images of a round.
-    pub images: usize,
+    pub(crate) images: usize,
     /// Training images on which the last designs are compared.
-    pub final_images: usize,
+    pub(crate) final_images: usize,
     /// Bodies that challenge the best of those.
-    pub challengers: usize,
+    pub(crate) challengers: usize,
     /// Least number of muscles in such a body.
-    pub min_muscles: usize,
+    pub(crate) min_muscles: usize,
 }
 
 /// The results of a round.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Round {
+pub(crate) struct Round {
     /// Its number, from 1.
-    pub round: usize,
+    pub(crate) round: usize,
     /// Predicted mean clipped margin of the design's answers to all training images.
-    pub predicted: f64,
+    pub(crate) predicted: f64,
     /// Mean clipped margin of its answers to the images of the round.
-    pub measured: f64,
+    pub(crate) measured: f64,
     /// Mean difference of the displacements from the prediction; positive to the right \[voxel
     /// lengths\].
-    pub off: f64,
+    pub(crate) off: f64,
     /// Number of places that change in the next design.
-    pub changed: usize,
+    pub(crate) changed: usize,
     /// Rollouts so far, without the first response.
-    pub rollouts: usize,
+    pub(crate) rollouts: usize,
 }
 
 /// The beginning of a training.
 #[derive(Clone, Debug, PartialEq)]
-pub enum First {
+pub(crate) enum First {
     /// The results of the first round.
     Round(Round),
     /// Mean clipped margin of the robot's own design, where there are no rounds.
@@ -83,23 +83,23 @@ pub enum First {
 
 /// A trained design.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TrainedDesign {
+pub(crate) struct TrainedDesign {
     /// The body.
-    pub body: Body,
+    pub(crate) body: Body,
     /// Numbers of the training images on which it was evaluated at the end.
-    pub shown: Vec<usize>,
+    pub(crate) shown: Vec<usize>,
     /// Its displacement under each of them \[voxel lengths\].
-    pub displacements: Vec<f64>,
+    pub(crate) displacements: Vec<f64>,
     /// Mean clipped margin of its answers.
-    pub objective: f64,
+    pub(crate) objective: f64,
     /// Direction in which the first group walks: 1 right, −1 left.
-    pub side: f64,
+    pub(crate) side: f64,
     /// Rollouts, without the first response.
-    pub rollouts: usize,
+    pub(crate) rollouts: usize,
 }
 
 /// Trains a gait with a known response to tell images apart.
-pub struct GaitTrainer<'a> {
+pub(crate) struct GaitTrainer<'a> {
     gait: &'a Gait,
     physics: &'a Physics,
     images: Vec<Image>,
@@ -126,7 +126,7 @@ impl<'a> GaitTrainer<'a> {
     ///
     /// # Panics
     /// Panics if there are no images.
-    pub fn new(
+    pub(crate) fn new(
         gait: &'a Gait,
         response: &Response,
         images: Vec<Image>,
@@ -166,7 +166,7 @@ impl<'a> GaitTrainer<'a> {
     }
 
     /// Returns the predicted mean clipped margin of the latest design over all training images.
-    pub fn predicted(&self) -> f64 {
+    pub(crate) fn predicted(&self) -> f64 {
         self.predicted
     }
 
@@ -174,7 +174,7 @@ impl<'a> GaitTrainer<'a> {
     ///
     /// # Errors
     /// Returns the error of the rollouts.
-    pub fn first<R: Rollouts>(&mut self, rollouts: &mut R) -> Result<First, R::Error> {
+    pub(crate) fn first<R: Rollouts>(&mut self, rollouts: &mut R) -> Result<First, R::Error> {
         match self.plan.rounds {
             0 => self.own(rollouts).map(First::Own),
             _ => self.round(rollouts).map(First::Round),
@@ -185,7 +185,7 @@ impl<'a> GaitTrainer<'a> {
     ///
     /// # Errors
     /// Returns the error of the rollouts.
-    pub fn round<R: Rollouts>(&mut self, rollouts: &mut R) -> Result<Round, R::Error> {
+    pub(crate) fn round<R: Rollouts>(&mut self, rollouts: &mut R) -> Result<Round, R::Error> {
         self.rounds += 1;
         let mut random = self.random(Use::Round, self.rounds as u64);
         let (measured, off) = self.measured(&mut random, rollouts)?;
@@ -275,7 +275,7 @@ impl<'a> GaitTrainer<'a> {
     ///
     /// # Errors
     /// Returns the error of the rollouts.
-    pub fn finish<R: Rollouts>(
+    pub(crate) fn finish<R: Rollouts>(
         self,
         rollouts: &mut R,
         mut told: impl FnMut(&Challenge),
@@ -317,7 +317,7 @@ impl<'a> GaitTrainer<'a> {
     }
 
     /// Returns the number of challengers: the designs before the last one, and those of the plan.
-    pub fn challengers(&self) -> usize {
+    pub(crate) fn challengers(&self) -> usize {
         self.finalists().len() + self.plan.challengers
     }
 

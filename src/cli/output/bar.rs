@@ -55,7 +55,7 @@ impl Drop for Line<'_> {
 }
 
 /// The progress of an evolution; the line disappears on drop.
-pub struct Bar<'c> {
+pub(crate) struct Bar<'c> {
     recent: Mutex<Option<Recent<Generation>>>,
     line: Line<'c>,
 }
@@ -67,7 +67,7 @@ impl<'c> Bar<'c> {
 
     /// Displays the progress (JSON: an event `generation`). The first call counts as the beginning:
     /// a resumed run calls it once before it continues.
-    pub fn update(&self, progress: &Generation) {
+    pub(crate) fn update(&self, progress: &Generation) {
         self.line.show(progress.done, |seconds| {
             let mut recent = lock(&self.recent);
             let recent = recent.get_or_insert(Recent::new(seconds, *progress));
@@ -79,7 +79,7 @@ impl<'c> Bar<'c> {
 }
 
 /// The progress of something counted; the line disappears on drop.
-pub struct Counter<'c> {
+pub(crate) struct Counter<'c> {
     label: String,
     unit: String,
     line: Line<'c>,
@@ -97,18 +97,18 @@ impl<'c> Counter<'c> {
     }
 
     /// Marks `known` items as done before, so that they do not count for the speed.
-    pub fn go_on_from(&self, known: u64) {
+    pub(crate) fn go_on_from(&self, known: u64) {
         *lock(&self.recent) = Recent::new(self.line.begin.elapsed().as_secs_f64(), known);
         self.update(known);
     }
 
     /// Excludes `count` items, later reported as done, from the speed.
-    pub fn skip(&self, count: u64) {
+    pub(crate) fn skip(&self, count: u64) {
         lock(&self.recent).shift(|done| *done += count);
     }
 
     /// Displays that `done` items are done (JSON: an event `progress`, as often as a plain line).
-    pub fn update(&self, done: u64) {
+    pub(crate) fn update(&self, done: u64) {
         #[derive(Serialize)]
         struct Count<'a> {
             label: &'a str,
@@ -129,7 +129,7 @@ impl<'c> Counter<'c> {
 }
 
 /// A text picture on stdout, which the next one replaces.
-pub struct Live<'c> {
+pub(crate) struct Live<'c> {
     console: &'c Console,
     height: usize,
 }
@@ -140,7 +140,7 @@ impl<'c> Live<'c> {
     }
 
     /// Displays a picture in place of the previous one.
-    pub fn show(&mut self, picture: &str) {
+    pub(crate) fn show(&mut self, picture: &str) {
         let up = if self.height > 0 { format!("\x1b[{}F", self.height) } else { String::new() };
         self.height = picture.lines().count();
         self.console.out(&format!("{up}{picture}\n"));

@@ -1,7 +1,7 @@
 //! [`Console`]: the only writer to the terminal. Results go to stdout, everything else to stderr.
 #![allow(clippy::disallowed_methods, reason = "this is the module that writes")]
 
-pub use crate::cli::output::bar::{Bar, Counter, Live};
+pub(crate) use crate::cli::output::bar::{Bar, Counter, Live};
 
 use crate::base;
 use crate::base::text::{is_unseen, one_line, shortened};
@@ -71,7 +71,7 @@ pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 impl Console {
     /// Creates a console on the process's stdout and stderr. It has no colours if `NO_COLOR` is
     /// set, and no moving lines if `TERM` is `dumb`.
-    pub fn new(mode: Mode) -> Self {
+    pub(crate) fn new(mode: Mode) -> Self {
         let set = |name| std::env::var_os(name).filter(|v| !v.is_empty());
         let smart = set("TERM").is_none_or(|term| term != "dumb");
         let narrow = [io::stdout().is_terminal(), io::stderr().is_terminal()];
@@ -102,29 +102,29 @@ impl Console {
     }
 
     /// Returns the mode.
-    pub fn mode(&self) -> Mode {
+    pub(crate) fn mode(&self) -> Mode {
         self.mode
     }
 
     /// Returns true if stdout may contain pictures in colour.
-    pub fn has_colour(&self) -> bool {
+    pub(crate) fn has_colour(&self) -> bool {
         self.terminals[0] && self.colour
     }
 
     /// Returns true if the reader of stdout has gone.
-    pub fn is_closed(&self) -> bool {
+    pub(crate) fn is_closed(&self) -> bool {
         lock(&self.streams).closed
     }
 
     /// Returns true if wanted results could not be written, for example because the disk is full.
-    pub fn has_lost_results(&self) -> bool {
+    pub(crate) fn has_lost_results(&self) -> bool {
         lock(&self.streams).lost
     }
 
     /// Writes a line of results to stdout; an empty line separates results for people. Like all
     /// text for people, it displays control characters and line breaks, which can only come from a
     /// file or its name, and never obeys them. On a terminal, lines break between words.
-    pub fn line(&self, text: &str) {
+    pub(crate) fn line(&self, text: &str) {
         match self.mode {
             Mode::Json if text.is_empty() => {}
             Mode::Json => self.event("result", &Text { text, file: None }),
@@ -133,7 +133,7 @@ impl Console {
     }
 
     /// Writes a shell command to stdout, on one line however long it is.
-    pub fn command(&self, text: &str) {
+    pub(crate) fn command(&self, text: &str) {
         match self.mode {
             Mode::Json => self.event("result", &Text { text, file: None }),
             _ => self.out(&format!("{text}\n")),
@@ -141,7 +141,7 @@ impl Console {
     }
 
     /// Writes a line about a file, such as "wrote walk.gif" (JSON: with its path under `file`).
-    pub fn line_about(&self, file: &Path, text: &str) {
+    pub(crate) fn line_about(&self, file: &Path, text: &str) {
         match self.mode {
             Mode::Json => self.event("result", &Text { text, file: Some(file.display().to_string()) }),
             _ => self.line(text),
@@ -149,13 +149,13 @@ impl Console {
     }
 
     /// Writes a document unchanged to stdout, in every mode: a config, a man page, a trajectory.
-    pub fn text(&self, text: &str) {
+    pub(crate) fn text(&self, text: &str) {
         self.out(text);
     }
 
     /// Writes a table of results to stdout, with numeric columns aligned to the right. On a
     /// terminal, [`table::fitted`] fits it to the width.
-    pub fn table(&self, headers: &[&str], rows: &[Vec<String>]) {
+    pub(crate) fn table(&self, headers: &[&str], rows: &[Vec<String>]) {
         #[derive(Serialize)]
         struct Table<'a> {
             headers: &'a [&'a str],
@@ -175,7 +175,7 @@ impl Console {
 
     /// Writes one JSON line to stdout: the payload's fields after `"event": name` (a payload that
     /// is no object: as `value`). Does nothing in other modes.
-    pub fn event(&self, name: &str, payload: &impl Serialize) {
+    pub(crate) fn event(&self, name: &str, payload: &impl Serialize) {
         if self.mode != Mode::Json {
             return;
         }
@@ -196,7 +196,7 @@ impl Console {
     }
 
     /// Writes a note for people to stderr (JSON: an event).
-    pub fn info(&self, text: &str) {
+    pub(crate) fn info(&self, text: &str) {
         match self.mode {
             Mode::Human => self.err(&lines(wrapped(&one_line(text), self.columns(1)))),
             Mode::Quiet => {}
@@ -206,7 +206,7 @@ impl Console {
 
     /// Writes a note with a command to copy: "next:" and the command. Blanks in place of "next:"
     /// align it with the note above.
-    pub fn suggest(&self, about: &str, command: &str) {
+    pub(crate) fn suggest(&self, about: &str, command: &str) {
         match self.mode {
             Mode::Human => self.err(&lines(wrapped_command(about, command, self.columns(1)))),
             _ => self.info(&format!("{about} {command}")),
@@ -214,19 +214,19 @@ impl Console {
     }
 
     /// Writes a warning to stderr, in every mode.
-    pub fn warning(&self, text: &str) {
+    pub(crate) fn warning(&self, text: &str) {
         self.err(&self.painted("warning:", "1;33", text));
     }
 
     /// Writes an error and its remedy, in the command line's terms, to stderr, in every mode.
-    pub fn failed(&self, error: &base::error::Error) {
+    pub(crate) fn failed(&self, error: &base::error::Error) {
         let explained = explain(error);
         self.error(&explained, explained.hint.as_deref());
     }
 
     /// Writes an error with its causes and an optional hint to stderr, in every mode. A cause that
     /// the line above already contains is left out.
-    pub fn error(&self, error: &(dyn Error + 'static), hint: Option<&str>) {
+    pub(crate) fn error(&self, error: &(dyn Error + 'static), hint: Option<&str>) {
         let mut told = error.to_string();
         let mut text = self.painted("error:", "1;31", &told);
         let mut causes = Vec::new();
@@ -251,25 +251,25 @@ impl Console {
     }
 
     /// Writes a usage message, plain or coloured, to stderr.
-    pub fn usage(&self, plain: &str, coloured: &str) {
+    pub(crate) fn usage(&self, plain: &str, coloured: &str) {
         let text = if self.terminals[1] && self.colour { coloured } else { plain };
         let columns = self.columns(1);
         self.err(&lines(text.lines().flat_map(|line| wrapped(line, columns)).collect()));
     }
 
     /// Creates the progress of an evolution: call [`Bar::update`] after every generation.
-    pub fn progress(&self, total: u64) -> Bar<'_> {
+    pub(crate) fn progress(&self, total: u64) -> Bar<'_> {
         Bar::new(self, total)
     }
 
     /// Creates the progress of `total` counted `unit`s, such as "images", "robots" or "bytes".
-    pub fn counter(&self, label: &str, total: u64, unit: &str) -> Counter<'_> {
+    pub(crate) fn counter(&self, label: &str, total: u64, unit: &str) -> Counter<'_> {
         Counter::new(self, label, total, unit)
     }
 
     /// Creates a text picture on stdout that the next one replaces, or returns `None` if stdout is
     /// not a terminal for people.
-    pub fn live(&self) -> Option<Live<'_>> {
+    pub(crate) fn live(&self) -> Option<Live<'_>> {
         (self.mode == Mode::Human && self.terminals[0]).then(|| Live::new(self))
     }
 
@@ -370,13 +370,13 @@ pub(super) mod tests {
 
     /// A writer that can be read, or that fails like a closed pipe.
     #[derive(Clone, Default)]
-    pub struct Page {
+    pub(crate) struct Page {
         text: Arc<Mutex<Vec<u8>>>,
         closed: bool,
     }
 
     impl Page {
-        pub fn read(&self) -> String {
+        pub(crate) fn read(&self) -> String {
             String::from_utf8(lock(&self.text).clone()).unwrap()
         }
     }
@@ -394,7 +394,7 @@ pub(super) mod tests {
         }
     }
 
-    pub fn console(mode: Mode) -> (Console, Page, Page) {
+    pub(crate) fn console(mode: Mode) -> (Console, Page, Page) {
         let (out, err) = (Page::default(), Page::default());
         (Console::with_writers(mode, Box::new(out.clone()), Box::new(err.clone())), out, err)
     }

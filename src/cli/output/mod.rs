@@ -1,17 +1,17 @@
 //! Terminal output: messages, tables, progress, the results of commands, walks.
 
-pub mod bar;
+pub(crate) mod bar;
 pub mod console;
-pub mod networks;
-pub mod pictures;
-pub mod player;
+pub(crate) mod networks;
+pub(crate) mod pictures;
+pub(crate) mod player;
 pub mod progress;
 pub mod reporters;
-pub mod responses;
-pub mod summary;
-pub mod sweeps;
-pub mod table;
-pub mod teams;
-pub mod terminal;
-pub mod verdicts;
-pub mod wrapping;
+pub(crate) mod responses;
+pub(crate) mod summary;
+pub(crate) mod sweeps;
+pub(crate) mod table;
+pub(crate) mod teams;
+pub(crate) mod terminal;
+pub(crate) mod verdicts;
+pub(crate) mod wrapping;

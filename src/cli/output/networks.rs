@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 /// Writes the table: task, accuracy and capacity, with the paper's values beside ours. `out` is the
 /// file, if it was written.
-pub fn capacity(console: &Console, file: &CapacityFile, out: Option<&Path>) {
+pub(crate) fn capacity(console: &Console, file: &CapacityFile, out: Option<&Path>) {
     if console.mode() == Mode::Json {
         let written = out.filter(|_| !file.tasks.is_empty()).map(|out| out.display().to_string());
         let done = serde_json::json!({ "file": written, "stopped": file.stopped, "tasks": file.tasks });
@@ -95,7 +95,7 @@ fn unknown() -> String {
 ///
 /// # Errors
 /// Returns an error if the figure cannot be made or written.
-pub fn figure(file: &CapacityFile, out: &Path) -> Result<[PathBuf; 2], PictureError> {
+pub(crate) fn figure(file: &CapacityFile, out: &Path) -> Result<[PathBuf; 2], PictureError> {
     let figure = plot::capacity(file);
     let files = FIGURES.map(|ending| out.with_extension(ending));
     write_whole(&files[0], figure.svg().as_bytes())?;
@@ -104,7 +104,7 @@ pub fn figure(file: &CapacityFile, out: &Path) -> Result<[PathBuf; 2], PictureEr
 }
 
 /// Writes the paper's table after a reproduction, with the paper's values beside ours.
-pub fn table(console: &Console, finished: &ReproduceOutcome) {
+pub(crate) fn table(console: &Console, finished: &ReproduceOutcome) {
     if console.mode() == Mode::Json {
         return console.event("reproduced", &finished.rows);
     }

@@ -18,7 +18,7 @@ use std::str::FromStr;
 
 /// A format of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
+pub(crate) enum Format {
     /// An animated GIF.
     Gif,
     /// A self-contained page for the browser.
@@ -55,17 +55,17 @@ fn or_default(asked: &[Format]) -> &[Format] {
 
 /// The pictures to make, and their files.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PicturesWanted {
+pub(crate) struct PicturesWanted {
     /// The formats with their files (unused for the terminal).
-    pub files: Vec<(Format, PathBuf)>,
+    pub(crate) files: Vec<(Format, PathBuf)>,
     /// The width of GIF and PNG, pixels.
-    pub width: u32,
+    pub(crate) width: u32,
     /// The control steps from one frame of the GIF to the next.
-    pub every: usize,
+    pub(crate) every: usize,
     /// The frames of the GIF per second.
-    pub fps: u32,
+    pub(crate) fps: u32,
     /// The look of the world in GIF and PNG.
-    pub look: Look,
+    pub(crate) look: Look,
 }
 
 impl Default for PicturesWanted {
@@ -76,7 +76,7 @@ impl Default for PicturesWanted {
 
 impl PicturesWanted {
     /// Chooses `replay-<name>.<format>` in a folder.
-    pub fn beside(folder: &Path, name: &str, formats: &[Format]) -> Self {
+    pub(crate) fn beside(folder: &Path, name: &str, formats: &[Format]) -> Self {
         let file = |&format: &Format| (format, folder.join(format!("replay-{name}.{format}")));
         PicturesWanted { files: or_default(formats).iter().map(file).collect(), ..PicturesWanted::default() }
     }
@@ -85,7 +85,7 @@ impl PicturesWanted {
     ///
     /// # Errors
     /// Returns an error if the extension is no known format, or a file cannot be written.
-    pub fn named(path: &Path, formats: &[Format]) -> Result<Self, Error> {
+    pub(crate) fn named(path: &Path, formats: &[Format]) -> Result<Self, Error> {
         folder::of_file(path)?;
         let files = match path.extension().map(|ending| ending.to_string_lossy().into_owned()) {
             None => or_default(formats)
@@ -118,7 +118,7 @@ impl PicturesWanted {
 
 /// Returns the default folder of a robot's pictures: that of its run.json, or, for a named run,
 /// the present one.
-pub fn folder(archive: &Path) -> PathBuf {
+pub(crate) fn folder(archive: &Path) -> PathBuf {
     match shipped::is_named(archive) {
         true => PathBuf::new(),
         false => archive.parent().unwrap_or(Path::new("")).to_path_buf(),
@@ -129,7 +129,11 @@ pub fn folder(archive: &Path) -> PathBuf {
 ///
 /// # Errors
 /// Returns an error if a picture cannot be made or written.
-pub fn make(console: &Console, replay: &Replay, wanted: &PicturesWanted) -> Result<Vec<PathBuf>, Error> {
+pub(crate) fn make(
+    console: &Console,
+    replay: &Replay,
+    wanted: &PicturesWanted,
+) -> Result<Vec<PathBuf>, Error> {
     let failed = |error: PictureError| match error {
         PictureError::Size { .. } => Error::usage(error.to_string()).about("width"),
         error => error.into(),

@@ -71,7 +71,7 @@ impl Player {
 ///
 /// # Errors
 /// Returns an error if a signal stops it. The terminal is restored in any case.
-pub fn play(console: &Console, walk: &Walk) -> Result<(), Error> {
+pub(crate) fn play(console: &Console, walk: &Walk) -> Result<(), Error> {
     let variable = |name| std::env::var(name).unwrap_or_default();
     let depth = Depth::of(console.has_colour(), &variable("COLORTERM"), &variable("TERM"));
     let Some(mut live) = console.live() else {

@@ -21,7 +21,7 @@ impl<T: Copy> Recent<T> {
     }
 
     /// Changes the earlier state, so that something counts as done before.
-    pub fn shift(&mut self, change: impl Fn(&mut T)) {
+    pub(crate) fn shift(&mut self, change: impl Fn(&mut T)) {
         self.marks.iter_mut().for_each(|(_, mark)| change(mark));
     }
 
@@ -88,11 +88,11 @@ fn left(before: u64, done: u64, total: u64, seconds: f64) -> Option<String> {
 /// Decides when a plain line is due where lines cannot be rewritten: the first at once, then every
 /// ten seconds or every tenth of the work, and the last.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Pacer(Option<(f64, f64)>);
+pub(crate) struct Pacer(Option<(f64, f64)>);
 
 impl Pacer {
     /// Returns true if a line is due, given the seconds since the start and the share of work done.
-    pub fn is_due(&mut self, seconds: f64, share: f64) -> bool {
+    pub(crate) fn is_due(&mut self, seconds: f64, share: f64) -> bool {
         let due = match self.0 {
             None => true,
             Some((then, before)) => {

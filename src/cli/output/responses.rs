@@ -11,7 +11,7 @@ use crate::store::response::{EndedBy, RobotResponse};
 use std::path::Path;
 
 /// Writes the results of a measurement, a line per robot.
-pub fn response(console: &Console, finished: &ResponseOutcome, out: &Path) {
+pub(crate) fn response(console: &Console, finished: &ResponseOutcome, out: &Path) {
     let ResponseOutcome { file, stopped, unwritten, .. } = finished;
     let written = unwritten.is_none() && !file.robots.is_empty();
     if console.mode() == Mode::Json {
@@ -90,7 +90,7 @@ fn row(robot: &RobotResponse, is_taught: bool, has_window: bool) -> Vec<String> 
 ///
 /// # Errors
 /// Returns an error if a picture cannot be made or written.
-pub fn pictures(console: &Console, finished: &ResponseOutcome) -> Result<(), PictureError> {
+pub(crate) fn pictures(console: &Console, finished: &ResponseOutcome) -> Result<(), PictureError> {
     let ResponseOutcome { file, pictures, .. } = finished;
     for (robot, [svg, png]) in file.robots.iter().zip(pictures) {
         let of = format!("robot {}, {}", robot.id, published::provenance(&file.run, file.run_seed));

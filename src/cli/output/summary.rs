@@ -28,7 +28,7 @@ const SHOWN: usize = 5;
 
 /// Writes the results of an evolution: the fittest robots, the files and, unless the command itself
 /// continues, the next steps.
-pub fn evolution(console: &Console, finished: &EvolveOutcome, out: &Path, goes_on: bool) {
+pub(crate) fn evolution(console: &Console, finished: &EvolveOutcome, out: &Path, goes_on: bool) {
     let EvolveOutcome { run, totals, .. } = finished;
     if console.mode() == Mode::Json {
         let elites = run.elites.len();
@@ -102,7 +102,7 @@ pub fn evolution(console: &Console, finished: &EvolveOutcome, out: &Path, goes_o
 }
 
 /// Writes the results of a training.
-pub fn training(console: &Console, finished: &train::TrainOutcome, out: &Path) {
+pub(crate) fn training(console: &Console, finished: &train::TrainOutcome, out: &Path) {
     let train::TrainOutcome { run, rollouts, size, .. } = finished;
     let Some(robot) = run.best() else { return };
     if console.mode() == Mode::Json {
@@ -127,7 +127,7 @@ pub fn training(console: &Console, finished: &train::TrainOutcome, out: &Path) {
 }
 
 /// Writes the results of the robots chosen on validation images.
-pub fn validation(console: &Console, best: &[Validated]) {
+pub(crate) fn validation(console: &Console, best: &[Validated]) {
     if console.mode() == Mode::Json {
         return console.event("validated", &best);
     }
@@ -140,7 +140,12 @@ pub fn validation(console: &Console, best: &[Validated]) {
 
 /// Writes the results of an evaluation: a table per robot, the means, the baselines and the paper's
 /// table. `capacity` is a known analysis of these robots; `out` is the file, if it was written.
-pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&CapacityFile>, out: Option<&Path>) {
+pub(crate) fn evaluation(
+    console: &Console,
+    report: &EvalFile,
+    capacity: Option<&CapacityFile>,
+    out: Option<&Path>,
+) {
     if report.robots.is_empty() {
         return console.warning("no robot was evaluated");
     }
@@ -229,7 +234,7 @@ pub fn evaluation(console: &Console, report: &EvalFile, capacity: Option<&Capaci
 }
 
 /// Writes the simulation speeds of this machine.
-pub fn speeds(console: &Console, speeds: &[Speed]) {
+pub(crate) fn speeds(console: &Console, speeds: &[Speed]) {
     if console.mode() == Mode::Json {
         return speeds.iter().for_each(|speed| console.event("speed", speed));
     }
@@ -254,7 +259,7 @@ pub fn speeds(console: &Console, speeds: &[Speed]) {
 }
 
 /// Lists the published robots.
-pub fn gallery(console: &Console, robots: &[Published]) {
+pub(crate) fn gallery(console: &Console, robots: &[Published]) {
     let rows = robots.iter().map(|robot| {
         let counts = robot.body.counts();
         let counts = [counts.muscle, counts.sensor, counts.total].map(|count| count.to_string());
@@ -267,7 +272,7 @@ pub fn gallery(console: &Console, robots: &[Published]) {
 }
 
 /// Lists the built-in configs: name and first comment.
-pub fn configs(console: &Console, configs: &[(&str, &str)]) {
+pub(crate) fn configs(console: &Console, configs: &[(&str, &str)]) {
     let rows = configs.iter().map(|(name, text)| {
         let about: Vec<&str> = text.lines().map_while(|line| line.strip_prefix("# ")).collect();
         let about = about.join(" ");
@@ -277,13 +282,13 @@ pub fn configs(console: &Console, configs: &[(&str, &str)]) {
 }
 
 /// Lists the schemas: name and subject.
-pub fn schemas(console: &Console, schemas: &[(&str, &str)]) {
+pub(crate) fn schemas(console: &Console, schemas: &[(&str, &str)]) {
     let rows: Vec<_> = schemas.iter().map(|(name, of)| vec![name.to_string(), of.to_string()]).collect();
     console.table(&["schema", "what it is of"], &rows);
 }
 
 /// Writes the results of a download.
-pub fn fetched(console: &Console, files: &[Fetched]) {
+pub(crate) fn fetched(console: &Console, files: &[Fetched]) {
     for file in files {
         let how = match &file.outcome {
             FetchOutcome::Kept => "was there and is correct".to_string(),
@@ -294,7 +299,7 @@ pub fn fetched(console: &Console, files: &[Fetched]) {
 }
 
 /// Writes the facts about a dataset.
-pub fn dataset(console: &Console, found: &FoundDataset) {
+pub(crate) fn dataset(console: &Console, found: &FoundDataset) {
     let info = &found.info;
     if console.mode() == Mode::Json {
         let mut event = serde_json::to_value(info).expect("names, numbers and texts are JSON");

@@ -19,7 +19,7 @@ use serde_json::{Map, Value};
 use std::path::Path;
 
 /// Writes the status of tasks: a line per task, and the number in each state.
-pub fn status(console: &Console, all: &[TaskStatus]) {
+pub(crate) fn status(console: &Console, all: &[TaskStatus]) {
     if console.mode() == Mode::Json {
         return all.iter().for_each(|status| console.event("task", status));
     }
@@ -63,7 +63,7 @@ fn in_short(all: &[TaskStatus]) -> String {
 ///
 /// # Errors
 /// Returns an error if a file cannot be written.
-pub fn collected(
+pub(crate) fn collected(
     console: &Console,
     name: &str,
     found: &Collected,
@@ -155,7 +155,7 @@ fn table(console: &Console, rows: &[SweepRow]) {
 }
 
 /// Writes the keys in which runs differ, a line per group that differs only in the seed.
-pub fn differences(console: &Console, runs: &[crate::analysis::progress::Progress]) {
+pub(crate) fn differences(console: &Console, runs: &[crate::analysis::progress::Progress]) {
     let (keys, groups) = alike(runs);
     if groups.len() < 2 || console.mode() != Mode::Human {
         return;

@@ -10,7 +10,7 @@ const SHORT: usize = 24;
 /// Returns the lines of a table as [`align`] does, if they fit into `most` columns. Otherwise
 /// headers and texts break between words. If that is not enough, the table continues below,
 /// repeating its first column. If not even two columns fit side by side, rows are stacked.
-pub fn fitted(headers: &[&str], rows: &[Vec<String>], most: usize) -> Vec<String> {
+pub(crate) fn fitted(headers: &[&str], rows: &[Vec<String>], most: usize) -> Vec<String> {
     let columns: Vec<Column> = (0..headers.len()).map(|place| Column::new(headers, rows, place)).collect();
     let blocks = blocks(&columns, most);
     if rows.is_empty() || blocks.iter().any(|block| needed(block) > most) {
@@ -21,7 +21,7 @@ pub fn fitted(headers: &[&str], rows: &[Vec<String>], most: usize) -> Vec<String
 
 /// Returns the lines of a table: headers, a rule, rows; two spaces between columns, numbers to the
 /// right. Short rows are filled with empty cells; cells without a header are left out.
-pub fn align(headers: &[&str], rows: &[Vec<String>]) -> Vec<String> {
+pub(crate) fn align(headers: &[&str], rows: &[Vec<String>]) -> Vec<String> {
     let columns: Vec<Column> = (0..headers.len()).map(|place| Column::new(headers, rows, place)).collect();
     let columns: Vec<&Column> = columns.iter().collect();
     drawn(&columns, &widths(&columns, usize::MAX))

@@ -14,7 +14,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// Returns an error if a picture cannot be made or written.
-pub fn team(console: &Console, file: &TeamFile, out: Option<&Path>) -> Result<(), Error> {
+pub(crate) fn team(console: &Console, file: &TeamFile, out: Option<&Path>) -> Result<(), Error> {
     let pictures = match out.filter(|_| file.answers.is_some()) {
         Some(out) => pictures(file, out)?,
         None => Vec::new(),

@@ -22,7 +22,7 @@ enum Pixel {
 
 /// The colour depth of a terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Depth {
+pub(crate) enum Depth {
     /// No colours: letters stand for materials.
     Plain,
     /// 256 colours of a fixed palette.
@@ -33,7 +33,7 @@ pub enum Depth {
 
 impl Depth {
     /// Infers the depth from the environment: whether colours are wanted, `COLORTERM` and `TERM`.
-    pub fn of(is_wanted: bool, colorterm: &str, term: &str) -> Self {
+    pub(crate) fn of(is_wanted: bool, colorterm: &str, term: &str) -> Self {
         let full = ["direct", "kitty", "alacritty", "foot", "ghostty", "wezterm"];
         match () {
             () if !is_wanted || term == "dumb" => Depth::Plain,
@@ -69,7 +69,7 @@ fn indexed(rgb: [u8; 3]) -> u8 {
 /// Renders a frame as `rows` lines of exactly `columns` characters, joined by newlines: a line of
 /// read-outs, then the world, with a moving camera. With colours, a character has two pixels (half
 /// blocks). In ASCII, `#` is rigid, `:` soft, `/` and `\` muscles, `-` and `+` sensors.
-pub fn frame(walk: &Walk, frame: usize, columns: usize, rows: usize, depth: Depth) -> String {
+pub(crate) fn frame(walk: &Walk, frame: usize, columns: usize, rows: usize, depth: Depth) -> String {
     let colour = depth != Depth::Plain;
     let (columns, rows) = (columns.min(1000), rows.min(1000));
     let words = readout(walk, frame);

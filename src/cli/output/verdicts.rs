@@ -8,7 +8,7 @@ use crate::store::audit::{AuditFile, RobotAudit, Verdict};
 use std::path::Path;
 
 /// Writes an audit's results: a line per robot, the verdict counts, and changes that break walks.
-pub fn audit(console: &Console, finished: &AuditOutcome, out: &Path) {
+pub(crate) fn audit(console: &Console, finished: &AuditOutcome, out: &Path) {
     let AuditOutcome { file, asked, known, stopped, unwritten, .. } = finished;
     let robots: Vec<&RobotAudit> = asked.iter().filter_map(|id| file.robot(id)).collect();
     let is_written = unwritten.is_none() && !(*stopped && file.robots.is_empty());

@@ -30,19 +30,19 @@ enum Kind {
 }
 
 /// Returns the columns that a text takes; colour sequences take none.
-pub fn width(text: &str) -> usize {
+pub(crate) fn width(text: &str) -> usize {
     let mut parts = text.split('\x1b');
     let first = parts.next().map_or(0, UnicodeWidthStr::width);
     first + parts.map(|part| part.split_once('m').map_or(0, |(_, seen)| seen.width())).sum::<usize>()
 }
 
 /// Wraps a one-line text and indents the continuation. Text in backticks is a command.
-pub fn wrapped(text: &str, columns: usize) -> Vec<String> {
+pub(crate) fn wrapped(text: &str, columns: usize) -> Vec<String> {
     fill(&words(text, Kind::Prose), INDENT, columns)
 }
 
 /// Wraps a command behind a label such as "next:", which may be blanks to align it.
-pub fn wrapped_command(about: &str, command: &str, columns: usize) -> Vec<String> {
+pub(crate) fn wrapped_command(about: &str, command: &str, columns: usize) -> Vec<String> {
     let mut all = words(about, Kind::Prose);
     let mut command = words(command, Kind::Command);
     if let Some(first) = command.first_mut() {
@@ -54,18 +54,18 @@ pub fn wrapped_command(about: &str, command: &str, columns: usize) -> Vec<String
 }
 
 /// Wraps a cell of a table.
-pub fn wrapped_cell(text: &str, columns: usize) -> Vec<String> {
+pub(crate) fn wrapped_cell(text: &str, columns: usize) -> Vec<String> {
     fill(&words(text, Kind::Cell), 0, columns)
 }
 
 /// Returns the minimum columns of a table cell.
-pub fn least_of_cell(text: &str) -> usize {
+pub(crate) fn least_of_cell(text: &str) -> usize {
     words(text, Kind::Cell).iter().map(|word| width(&word.text)).max().unwrap_or(0)
 }
 
 /// Joins a label and parts in one line: the first part always, later ones if they fit. A label that
 /// is too long keeps its beginning and end.
-pub fn one_of(label: &str, parts: &[String], columns: usize) -> String {
+pub(crate) fn one_of(label: &str, parts: &[String], columns: usize) -> String {
     let (first, others) = parts.split_first().map_or(("", parts), |(first, others)| (first, others));
     let label = shortened(label, columns.saturating_sub(width(first) + 1));
     let mut line = if label.is_empty() { first.to_string() } else { format!("{label} {first}") };

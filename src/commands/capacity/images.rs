@@ -25,7 +25,7 @@ pub(crate) struct Images {
     waiting: Vec<Seen>,
     test: Vec<Seen>,
     /// Hash of all images as they are seen.
-    pub key: String,
+    pub(crate) key: String,
 }
 
 /// An image as the robots see it.
@@ -35,7 +35,7 @@ pub(crate) struct Seen {
 }
 
 impl Images {
-    pub fn of(
+    pub(crate) fn of(
         report: &EvalFile,
         setting: &RunSetting,
         (eval, config): (&Path, &CapacityConfig),
@@ -124,7 +124,7 @@ pub(crate) struct Task {
 }
 
 impl Task {
-    pub fn new(
+    pub(crate) fn new(
         split: &grouping::ClassSplit,
         kind: NetworkKind,
         config: &CapacityConfig,
@@ -146,7 +146,7 @@ impl Task {
     ///
     /// # Errors
     /// Returns [`Stopped`](crate::base::error::ErrorKind::Stopped) if the session was stopped.
-    pub fn train(
+    pub(crate) fn train(
         &self,
         size: usize,
         config: &CapacityConfig,

@@ -25,14 +25,14 @@ const PIXEL_IMAGES_PER_CLASS: usize = 500;
 #[derive(Clone, Copy)]
 pub(crate) struct Draw {
     /// The number of images in all.
-    pub images: HowMany,
+    pub(crate) images: HowMany,
     /// Test or validation images.
-    pub split: HeldOut,
+    pub(crate) split: HeldOut,
     /// Seed of the draw.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Images by which robots are chosen at the same time, if they are; `None` in it: as many as
     /// the config says.
-    pub choosing: Option<Option<usize>>,
+    pub(crate) choosing: Option<Option<usize>>,
 }
 
 /// Test or validation images, as robots see them.
@@ -41,7 +41,7 @@ pub(crate) struct HeldOutImages<'a> {
     dataset: &'a Dataset,
     draw: Draw,
     /// The images.
-    pub images: Vec<ImageRef>,
+    pub(crate) images: Vec<ImageRef>,
     /// Each image as all robots see it together.
     stimuli: Vec<Grid<f64>>,
 }
@@ -52,7 +52,7 @@ impl<'a> HeldOutImages<'a> {
     ///
     /// # Errors
     /// Returns an error if there are too few images, or fewer are requested than classes.
-    pub fn draw(
+    pub(crate) fn draw(
         config: &'a Config,
         sources: &[StoredRun],
         dataset: &'a Dataset,
@@ -92,7 +92,7 @@ impl<'a> HeldOutImages<'a> {
     ///
     /// # Errors
     /// Returns an error if an image cannot be drawn or seen.
-    pub fn seen_by(&self, config: &Config) -> Result<Cow<'_, [Grid<f64>]>, Error> {
+    pub(crate) fn seen_by(&self, config: &Config) -> Result<Cow<'_, [Grid<f64>]>, Error> {
         match config.stimulus == self.config.stimulus {
             true => Ok(Cow::Borrowed(&self.stimuli)),
             false => see_all(config, self.dataset, self.draw.split.split(), &self.images).map(Cow::Owned),
@@ -103,7 +103,7 @@ impl<'a> HeldOutImages<'a> {
     ///
     /// # Errors
     /// Returns an error if an image cannot be drawn or seen.
-    pub fn baselines<'t>(
+    pub(crate) fn baselines<'t>(
         &self,
         sources: &[StoredRun],
         tasks: impl Iterator<Item = (&'t str, &'t grouping::ClassSplit)>,

@@ -26,15 +26,15 @@ use std::sync::{Mutex, PoisonError};
 
 /// Summary of the tasks.
 #[derive(Clone, Debug, Default)]
-pub struct TasksSummary {
+pub(crate) struct TasksSummary {
     /// Number of tasks done, now or before.
-    pub done: usize,
+    pub(crate) done: usize,
     /// Numbers of the failed tasks.
-    pub failed: Vec<usize>,
+    pub(crate) failed: Vec<usize>,
     /// Number of tasks that other processes work on.
-    pub elsewhere: usize,
+    pub(crate) elsewhere: usize,
     /// Number of tasks that were stopped or did not begin.
-    pub open: usize,
+    pub(crate) open: usize,
 }
 
 /// Checks that tasks that have not begun have images, also for their tests. Otherwise they would
@@ -42,7 +42,7 @@ pub struct TasksSummary {
 ///
 /// # Errors
 /// Returns an error if images are missing.
-pub fn check_data<'a>(
+pub(crate) fn check_data<'a>(
     tasks: impl Iterator<Item = (usize, &'a Task)>,
     place: &TaskFolders,
     data: Option<&Path>,
@@ -101,7 +101,7 @@ pub(crate) fn check_test(
 ///
 /// # Errors
 /// Returns an error if the folder cannot be made, or there are no images.
-pub fn run_all(
+pub(crate) fn run_all(
     tasks: &[Task],
     place: &TaskFolders,
     jobs: Option<usize>,

@@ -2,12 +2,12 @@
 //! trains, then does the steps of its plan. Its folder records its state, so that any process on
 //! any machine can go on with it.
 
-pub mod all;
-pub mod status;
-pub mod steps;
-pub mod task;
+pub(crate) mod all;
+pub(crate) mod status;
+pub(crate) mod steps;
+pub(crate) mod task;
 
-pub use all::{TasksSummary, check_data, run_all};
-pub use status::{TaskStatus, status};
-pub use steps::run;
-pub use task::{AuditStep, EvalStep, Run, Steps, Task, TaskFolders, TrainRun, check_folders};
+pub(crate) use all::{TasksSummary, check_data, run_all};
+pub(crate) use status::{TaskStatus, status};
+pub(crate) use steps::run;
+pub(crate) use task::{AuditStep, EvalStep, Run, Steps, Task, TaskFolders, TrainRun, check_folders};

@@ -16,28 +16,28 @@ const ROW: u64 = 4096;
 
 /// Status of a task, as its folder says.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct TaskStatus {
+pub(crate) struct TaskStatus {
     /// Its number, from 1.
-    pub task: usize,
+    pub(crate) task: usize,
     /// Its name.
-    pub name: String,
+    pub(crate) name: String,
     /// Its state.
-    pub state: TaskState,
+    pub(crate) state: TaskState,
     /// Generations done and requested; `None` for a training.
-    pub generations: Option<[u64; 2]>,
+    pub(crate) generations: Option<[u64; 2]>,
     /// Wall-clock time so far \[s\]; for a running task, as far as its run has written it.
-    pub seconds: Option<f64>,
+    pub(crate) seconds: Option<f64>,
     /// Estimated time left \[s\], if known.
-    pub seconds_left: Option<f64>,
+    pub(crate) seconds_left: Option<f64>,
     /// Its error, or the process that works on it.
-    pub about: Option<String>,
+    pub(crate) about: Option<String>,
 }
 
 /// Returns the status of all tasks.
 ///
 /// # Errors
 /// Returns an error if a folder cannot be read.
-pub fn status(tasks: &[Task], place: &TaskFolders) -> Result<Vec<TaskStatus>, Error> {
+pub(crate) fn status(tasks: &[Task], place: &TaskFolders) -> Result<Vec<TaskStatus>, Error> {
     let locks: Vec<PathBuf> = tasks.iter().map(|task| place.folder(task).join(TASK_LOCK)).collect();
     let mut all = Vec::new();
     for ((number, task), held) in (1..).zip(tasks).zip(lock::states(&locks)) {

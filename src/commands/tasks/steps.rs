@@ -21,7 +21,7 @@ use std::time::Instant;
 ///
 /// # Errors
 /// Returns an error if it failed or was stopped, or another process works on it.
-pub fn run(task: &Task, place: &TaskFolders, session: &Session) -> Result<(), Error> {
+pub(crate) fn run(task: &Task, place: &TaskFolders, session: &Session) -> Result<(), Error> {
     let folder = place.folder(task);
     std::fs::create_dir_all(&folder).map_err(|error| Error::writing(&folder, &error))?;
     let lock = folder.join(TASK_LOCK);

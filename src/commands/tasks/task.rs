@@ -19,20 +19,20 @@ use std::path::{Path, PathBuf};
 
 /// A task of a sweep or a reproduction.
 #[derive(Clone, Debug)]
-pub struct Task {
+pub(crate) struct Task {
     /// Its name, which its run folder shares.
-    pub name: String,
+    pub(crate) name: String,
     /// Its run.
-    pub run: Run,
+    pub(crate) run: Run,
     /// Steps after the run.
-    pub steps: Steps,
+    pub(crate) steps: Steps,
     /// Keys that differ between tasks, with their values as text, for tables.
-    pub varied: Vec<(String, String)>,
+    pub(crate) varied: Vec<(String, String)>,
 }
 
 /// The run of a task.
 #[derive(Clone, Debug)]
-pub enum Run {
+pub(crate) enum Run {
     /// `evolve`, with the name of the run, and the groups of classes if the plan names them.
     Evolve(Box<Config>, String, Option<Groups>),
     /// `train`.
@@ -59,43 +59,43 @@ impl Run {
 
 /// A training.
 #[derive(Clone, Debug)]
-pub struct TrainRun {
+pub(crate) struct TrainRun {
     /// The run.json whose robots are trained.
-    pub archive: PathBuf,
+    pub(crate) archive: PathBuf,
     /// SHA-256 of this file.
-    pub sha256: String,
+    pub(crate) sha256: String,
     /// Its robots to train.
-    pub robots: String,
+    pub(crate) robots: String,
     /// The two groups of classes.
-    pub groups: Groups,
+    pub(crate) groups: Groups,
     /// Seed of all random numbers.
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Keys that differ from those of the run.
-    pub set: Vec<String>,
+    pub(crate) set: Vec<String>,
     /// The resulting config.
-    pub config: Config,
+    pub(crate) config: Config,
 }
 
 /// Steps after a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct Steps {
+pub(crate) struct Steps {
     /// An audit, as by `morphcog audit`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub audit: Option<AuditStep>,
+    pub(crate) audit: Option<AuditStep>,
     /// A test on held-out images, as by `morphcog eval`.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub eval: Option<EvalStep>,
+    pub(crate) eval: Option<EvalStep>,
 }
 
 /// An audit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct AuditStep {
+pub(crate) struct AuditStep {
     /// Robots to audit, as with `--robots` of `morphcog audit`. Default "all".
-    pub robots: String,
+    pub(crate) robots: String,
     /// Criteria of the verdicts.
-    pub criteria: Criteria,
+    pub(crate) criteria: Criteria,
 }
 
 impl Default for AuditStep {
@@ -107,15 +107,15 @@ impl Default for AuditStep {
 /// A test on held-out images.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
-pub struct EvalStep {
+pub(crate) struct EvalStep {
     /// Robots to test, as with `--robots` of `morphcog eval`. Default "best".
-    pub robots: String,
+    pub(crate) robots: String,
     /// Total number of images, evenly divided between the classes, or "all". Default 1000.
-    pub images: HowMany,
+    pub(crate) images: HowMany,
     /// Split of the images. Default "test".
-    pub split: HeldOut,
+    pub(crate) split: HeldOut,
     /// True to test only robots that the audit found physical. Default false.
-    pub physical_only: bool,
+    pub(crate) physical_only: bool,
 }
 
 impl Default for EvalStep {
@@ -163,9 +163,9 @@ pub(crate) fn selection(key: &str, text: &str) -> Result<Selection, Error> {
 
 /// The place where tasks are done.
 #[derive(Clone, Debug)]
-pub struct TaskFolders {
+pub(crate) struct TaskFolders {
     /// Parent of all run folders.
-    pub out: PathBuf,
+    pub(crate) out: PathBuf,
 }
 
 impl TaskFolders {
@@ -222,7 +222,7 @@ impl Task {
     }
 
     /// Returns the default folder of its images if it exists; it depends on the working folder.
-    pub fn data_here(&self) -> Option<PathBuf> {
+    pub(crate) fn data_here(&self) -> Option<PathBuf> {
         let (data, whereabouts) = match &self.run {
             Run::Evolve(config, ..) => (&config.data, Whereabouts::given(None)),
             Run::Train(training) => {
@@ -233,7 +233,7 @@ impl Task {
     }
 
     /// Returns the folder of the atlas that its gaits are from, if any.
-    pub fn atlas(&self) -> Option<PathBuf> {
+    pub(crate) fn atlas(&self) -> Option<PathBuf> {
         let Run::Train(training) = &self.run else { return None };
         shipped::atlas_of(&training.archive)
     }
@@ -251,7 +251,7 @@ impl Task {
 ///
 /// # Errors
 /// Returns an error for each of them, with the keys that differ.
-pub fn check_folders(tasks: &[Task], place: &TaskFolders) -> Result<(), Vec<Error>> {
+pub(crate) fn check_folders(tasks: &[Task], place: &TaskFolders) -> Result<(), Vec<Error>> {
     let check = |(number, task): (usize, &Task)| {
         let path = place.folder(task).join(TASK_JSON);
         let of = |known: TaskFile| differing(&known.settings, &task.settings());

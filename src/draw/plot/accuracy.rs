@@ -14,7 +14,7 @@ const NAMED: usize = 40;
 
 /// Plots the accuracy of every robot on test or validation images with its 95 % interval, a block
 /// per task, with the mean and the baselines, which need no body.
-pub fn accuracy(report: &EvalFile) -> Figure {
+pub(crate) fn accuracy(report: &EvalFile) -> Figure {
     let mut canvas = Canvas::new();
     let of = format!("{}; {}", runs(report), report.selection());
     let title = format!("Accuracy on {} images", report.split);

@@ -15,15 +15,15 @@ const GAP: f64 = 2.0;
 
 /// A range of numbers with ticks.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Axis {
-    pub from: f64,
-    pub to: f64,
+pub(crate) struct Axis {
+    pub(crate) from: f64,
+    pub(crate) to: f64,
     step: f64,
 }
 
 impl Axis {
     /// Returns a range that covers low … high and ends on ticks, with about this number of them.
-    pub fn nice(low: f64, high: f64, about: usize) -> Self {
+    pub(crate) fn nice(low: f64, high: f64, about: usize) -> Self {
         let Axis { from, to, step } = Axis::stepped(low, high, about);
         // Ends that miss a tick only by rounding stay.
         let slack = 1e-9 * step;
@@ -33,7 +33,7 @@ impl Axis {
     }
 
     /// Returns exactly the range low … high, with about this number of ticks in it.
-    pub fn exact(low: f64, high: f64, about: usize) -> Self {
+    pub(crate) fn exact(low: f64, high: f64, about: usize) -> Self {
         let axis = Axis::stepped(low, high, about);
         // A single tick gives no scale: a step longer than both sides leaves only zero. With about
         // six, steps are shorter than half the range, so there are two ticks wherever it begins.
@@ -51,31 +51,31 @@ impl Axis {
     }
 
     /// Restricts ticks to whole numbers.
-    pub fn whole(self) -> Self {
+    pub(crate) fn whole(self) -> Self {
         Axis { step: self.step.max(1.0), ..self }
     }
 
     /// Returns the positions of the ticks.
-    pub fn ticks(&self) -> Vec<f64> {
+    pub(crate) fn ticks(&self) -> Vec<f64> {
         let first = (self.from / self.step - 1e-6).ceil();
         let count = ((self.to / self.step + 1e-6).floor() - first).clamp(-1.0, 100.0) as i32;
         (0..=count).map(|k| (first + f64::from(k)) * self.step).collect()
     }
 
     /// Formats a number for a tick.
-    pub fn label(&self, value: f64) -> String {
+    pub(crate) fn label(&self, value: f64) -> String {
         let decimals = (-libm::log10(self.step).floor()).clamp(0.0, 6.0) as usize;
         grouped(&number::fixed(value, decimals))
     }
 
     /// Returns the width of the widest tick label, points.
-    pub fn labels_width(&self) -> f64 {
+    pub(crate) fn labels_width(&self) -> f64 {
         let widths = self.ticks().into_iter().map(|tick| fonts::width(&self.label(tick), TEXT, false));
         widths.fold(0.0, f64::max)
     }
 
     /// Returns the position of a value: 0 at the beginning of the axis, 1 at its end.
-    pub fn share(&self, value: f64) -> f64 {
+    pub(crate) fn share(&self, value: f64) -> f64 {
         (value - self.from) / (self.to - self.from)
     }
 }
@@ -96,21 +96,21 @@ fn grouped(text: &str) -> String {
 
 /// A rectangle of the figure with two axes.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Plot {
-    pub at: [f64; 2],
-    pub size: [f64; 2],
-    pub x: Axis,
-    pub y: Axis,
+pub(crate) struct Plot {
+    pub(crate) at: [f64; 2],
+    pub(crate) size: [f64; 2],
+    pub(crate) x: Axis,
+    pub(crate) y: Axis,
 }
 
 impl Plot {
     /// Maps a pair of values to a point of the figure, in points.
-    pub fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [self.at[0] + self.x.share(x) * self.size[0], self.at[1] + (1.0 - self.y.share(y)) * self.size[1]]
     }
 
     /// Draws grid lines at the ticks.
-    pub fn grid(&self, canvas: &mut Canvas, across: bool, up: bool) {
+    pub(crate) fn grid(&self, canvas: &mut Canvas, across: bool, up: bool) {
         let pen = Pen::new(scales::GRID, 0.5);
         let [left, top] = self.at;
         for tick in self.y.ticks().into_iter().filter(|_| across) {
@@ -124,7 +124,7 @@ impl Plot {
     }
 
     /// Draws the lower axis, with its name below.
-    pub fn lower_axis(&self, canvas: &mut Canvas, name: Option<&str>) {
+    pub(crate) fn lower_axis(&self, canvas: &mut Canvas, name: Option<&str>) {
         let bottom = self.at[1] + self.size[1];
         let pen = Pen::new(colour::INK, LINE);
         canvas.line([self.at[0], bottom], [self.at[0] + self.size[0], bottom], pen);
@@ -142,12 +142,12 @@ impl Plot {
     }
 
     /// Draws the left axis, with its name beside it.
-    pub fn left_axis(&self, canvas: &mut Canvas, name: &str) {
+    pub(crate) fn left_axis(&self, canvas: &mut Canvas, name: &str) {
         self.left_axis_beside(canvas, name, self.y.labels_width());
     }
 
     /// Draws the left axis with a fixed room for labels, so that names of stacked plots line up.
-    pub fn left_axis_beside(&self, canvas: &mut Canvas, name: &str, labels: f64) {
+    pub(crate) fn left_axis_beside(&self, canvas: &mut Canvas, name: &str, labels: f64) {
         let [left, top] = self.at;
         let pen = Pen::new(colour::INK, LINE);
         canvas.line([left, top], [left, top + self.size[1]], pen);
@@ -163,20 +163,20 @@ impl Plot {
 }
 
 /// Space for a lower axis and its name, points.
-pub const AXIS: f64 = 21.5;
+pub(crate) const AXIS: f64 = 21.5;
 
 /// Returns the space for a left axis and its name, points, if the labels have this width.
-pub fn left_space(labels: f64) -> f64 {
+pub(crate) fn left_space(labels: f64) -> f64 {
     labels + TICK + GAP + 4.0 + TEXT + 2.0
 }
 
 /// Draws the title (bold) and the subject `of` below; returns the y below them.
-pub fn heading(canvas: &mut Canvas, title: &str, of: &str, width: f64) -> f64 {
+pub(crate) fn heading(canvas: &mut Canvas, title: &str, of: &str, width: f64) -> f64 {
     heading_in_lines(canvas, title, of, width, 1)
 }
 
 /// Draws the same as [`heading`], with up to `count` lines for the subject.
-pub fn heading_in_lines(canvas: &mut Canvas, title: &str, of: &str, width: f64, count: usize) -> f64 {
+pub(crate) fn heading_in_lines(canvas: &mut Canvas, title: &str, of: &str, width: f64, count: usize) -> f64 {
     const LINE: f64 = 9.5;
     let most = width - 2.0 * MARGIN;
     canvas.fitted(
@@ -194,10 +194,10 @@ pub fn heading_in_lines(canvas: &mut Canvas, title: &str, of: &str, width: f64, 
 }
 
 /// Margin at the figure's edges, points.
-pub const MARGIN: f64 = 5.0;
+pub(crate) const MARGIN: f64 = 5.0;
 
 /// Draws a horizontal bar of colours with its axis below and its name above.
-pub fn colour_bar(
+pub(crate) fn colour_bar(
     canvas: &mut Canvas,
     [x, y]: [f64; 2],
     width: f64,

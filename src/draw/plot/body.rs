@@ -14,7 +14,7 @@ use crate::draw::plot::{robot, scales};
 const MAP: f64 = 132.0;
 
 /// Plots a body's voxels by material, with a legend that counts them. `of` names the robot.
-pub fn body(body: &Body, of: &str) -> Figure {
+pub(crate) fn body(body: &Body, of: &str) -> Figure {
     let mut canvas = Canvas::new();
     let top = heading(&mut canvas, "Body", of, COLUMN) + 2.0;
     let at = [MARGIN + 1.0, top];

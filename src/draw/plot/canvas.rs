@@ -9,13 +9,13 @@ use crate::draw::fonts;
 const MOST: usize = 400;
 
 /// Size of most words, points: the smallest that is easy to read in print.
-pub const TEXT: f64 = 7.2;
+pub(crate) const TEXT: f64 = 7.2;
 /// Size of headings, points.
-pub const HEADING: f64 = 8.2;
+pub(crate) const HEADING: f64 = 8.2;
 
 /// The part of a text that is fixed at its position.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Anchor {
+pub(crate) enum Anchor {
     /// The left end.
     #[default]
     Start,
@@ -27,13 +27,13 @@ pub enum Anchor {
 
 /// The style of a text.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TextStyle {
-    pub size: f64,
-    pub bold: bool,
-    pub colour: Colour,
-    pub anchor: Anchor,
+pub(crate) struct TextStyle {
+    pub(crate) size: f64,
+    pub(crate) bold: bool,
+    pub(crate) colour: Colour,
+    pub(crate) anchor: Anchor,
     /// True if the text runs upwards.
-    pub upwards: bool,
+    pub(crate) upwards: bool,
 }
 
 impl Default for TextStyle {
@@ -44,43 +44,43 @@ impl Default for TextStyle {
 
 impl TextStyle {
     /// Returns the default style, anchored in the middle.
-    pub fn middle() -> Self {
+    pub(crate) fn middle() -> Self {
         TextStyle { anchor: Anchor::Middle, ..TextStyle::default() }
     }
 
     /// Returns the default style, anchored at the right end.
-    pub fn end() -> Self {
+    pub(crate) fn end() -> Self {
         TextStyle { anchor: Anchor::End, ..TextStyle::default() }
     }
 
     /// Sets the colour.
-    pub fn colour(self, colour: Colour) -> Self {
+    pub(crate) fn colour(self, colour: Colour) -> Self {
         TextStyle { colour, ..self }
     }
 
     /// Makes the text bold.
-    pub fn bold(self) -> Self {
+    pub(crate) fn bold(self) -> Self {
         TextStyle { bold: true, ..self }
     }
 }
 
 /// The style of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pen {
-    pub colour: Colour,
-    pub width: f64,
+pub(crate) struct Pen {
+    pub(crate) colour: Colour,
+    pub(crate) width: f64,
     /// Lengths of dashes and of the gaps between them.
-    pub dashes: Option<[f64; 2]>,
+    pub(crate) dashes: Option<[f64; 2]>,
 }
 
 impl Pen {
     /// Creates a pen for solid lines.
-    pub fn new(colour: Colour, width: f64) -> Self {
+    pub(crate) fn new(colour: Colour, width: f64) -> Self {
         Pen { colour, width, dashes: None }
     }
 
     /// Makes the line dashed.
-    pub fn dashed(self, dash: f64, gap: f64) -> Self {
+    pub(crate) fn dashed(self, dash: f64, gap: f64) -> Self {
         Pen { dashes: Some([dash, gap]), ..self }
     }
 }
@@ -127,7 +127,7 @@ pub(super) enum Ink {
 
 /// A piece of a path.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Piece {
+pub(crate) enum Piece {
     /// A line through points.
     Line(Vec<[f64; 2]>),
     /// A line through points and back to the first.
@@ -150,13 +150,13 @@ pub enum Piece {
 
 /// A picture under construction: its elements in drawing order, in points.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Canvas {
+pub(crate) struct Canvas {
     elements: Vec<Element>,
 }
 
 impl Canvas {
     /// Creates an empty canvas.
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Canvas::default()
     }
 
@@ -166,22 +166,22 @@ impl Canvas {
     }
 
     /// Draws a filled rectangle from its top left corner.
-    pub fn rectangle(&mut self, at: [f64; 2], size: [f64; 2], fill: Colour) {
+    pub(crate) fn rectangle(&mut self, at: [f64; 2], size: [f64; 2], fill: Colour) {
         self.elements.push(Element::Rectangle { at, size, ink: Ink::Fill(fill) });
     }
 
     /// Draws the outline of a rectangle.
-    pub fn frame(&mut self, at: [f64; 2], size: [f64; 2], pen: Pen) {
+    pub(crate) fn frame(&mut self, at: [f64; 2], size: [f64; 2], pen: Pen) {
         self.elements.push(Element::Rectangle { at, size, ink: Ink::Line(pen) });
     }
 
     /// Draws a line between two points.
-    pub fn line(&mut self, from: [f64; 2], to: [f64; 2], pen: Pen) {
+    pub(crate) fn line(&mut self, from: [f64; 2], to: [f64; 2], pen: Pen) {
         self.path(vec![Piece::Line(vec![from, to])], pen);
     }
 
     /// Draws a line through points, with gaps where a point is not finite.
-    pub fn polyline(&mut self, points: &[[f64; 2]], pen: Pen) {
+    pub(crate) fn polyline(&mut self, points: &[[f64; 2]], pen: Pen) {
         let finite = |p: &[f64; 2]| p.iter().all(|v| v.is_finite());
         let pieces = points.split(|p| !finite(p)).filter(|piece| piece.len() > 1);
         let pieces: Vec<Piece> = pieces.map(|piece| Piece::Line(piece.to_vec())).collect();
@@ -191,40 +191,40 @@ impl Canvas {
     }
 
     /// Draws the line of a path.
-    pub fn path(&mut self, pieces: Vec<Piece>, pen: Pen) {
+    pub(crate) fn path(&mut self, pieces: Vec<Piece>, pen: Pen) {
         self.elements.push(Element::Path { pieces, ink: Ink::Line(pen) });
     }
 
     /// Draws a filled path.
-    pub fn area(&mut self, pieces: Vec<Piece>, fill: Colour) {
+    pub(crate) fn area(&mut self, pieces: Vec<Piece>, fill: Colour) {
         self.elements.push(Element::Path { pieces, ink: Ink::Fill(fill) });
     }
 
     /// Draws a filled circle.
-    pub fn dot(&mut self, at: [f64; 2], radius: f64, fill: Colour) {
+    pub(crate) fn dot(&mut self, at: [f64; 2], radius: f64, fill: Colour) {
         self.elements.push(Element::Dot { at, radius, fill });
     }
 
     /// Draws a text on its baseline, shortened to what any figure has room for.
-    pub fn text(&mut self, at: [f64; 2], text: &str, words: TextStyle) {
+    pub(crate) fn text(&mut self, at: [f64; 2], text: &str, words: TextStyle) {
         let text = shortened(text, MOST).chars().map(printable).collect();
         self.elements.push(Element::Text { at, text, words });
     }
 
     /// Draws a text, cut to fit into `most` points.
-    pub fn fitted(&mut self, at: [f64; 2], text: &str, most: f64, words: TextStyle) {
+    pub(crate) fn fitted(&mut self, at: [f64; 2], text: &str, most: f64, words: TextStyle) {
         self.text(at, &fonts::fitted(text, words.size, words.bold, most), words);
     }
 
     /// Draws the content of `draw` with an opacity as a whole.
-    pub fn faded(&mut self, opacity: f64, draw: impl FnOnce(&mut Canvas)) {
+    pub(crate) fn faded(&mut self, opacity: f64, draw: impl FnOnce(&mut Canvas)) {
         let mut content = Canvas::new();
         draw(&mut content);
         self.elements.push(Element::Faded { opacity, content });
     }
 
     /// Draws the content of `draw`, clipped to a rectangle; coordinates stay those of the figure.
-    pub fn clipped(&mut self, at: [f64; 2], size: [f64; 2], draw: impl FnOnce(&mut Canvas)) {
+    pub(crate) fn clipped(&mut self, at: [f64; 2], size: [f64; 2], draw: impl FnOnce(&mut Canvas)) {
         let mut content = Canvas::new();
         draw(&mut content);
         self.elements.push(Element::Clipped { at, size, content });

@@ -19,7 +19,7 @@ const CROSSING: Pen = Pen { colour: scales::VERMILLION, width: 0.9, dashes: Some
 
 /// Plots the mean accuracy of networks over their size with its standard deviation, the quadratic
 /// fit, the robots' accuracy and where the two meet; a panel per task and kind of network.
-pub fn capacity(file: &CapacityFile) -> Figure {
+pub(crate) fn capacity(file: &CapacityFile) -> Figure {
     let panels: Vec<(&TaskCapacity, &Curve)> =
         file.tasks.iter().flat_map(|task| task.curves.iter().map(move |curve| (task, curve))).collect();
     let (columns, width) = if panels.len() <= 1 { (1, COLUMN) } else { (2, PAGE) };

@@ -42,22 +42,22 @@ impl Figure {
 
     /// Sets the background.
     #[must_use]
-    pub fn on(self, background: Background) -> Self {
+    pub(crate) fn on(self, background: Background) -> Self {
         Figure { background, ..self }
     }
 
     /// Returns the width and height in points.
-    pub fn size(&self) -> [f64; 2] {
+    pub(crate) fn size(&self) -> [f64; 2] {
         self.size
     }
 
     /// Returns the title, a single line.
-    pub fn title(&self) -> &str {
+    pub(crate) fn title(&self) -> &str {
         &self.title
     }
 
     /// Returns the figure as SVG: one element `svg`, for a file or for a page.
-    pub fn svg(&self) -> String {
+    pub(crate) fn svg(&self) -> String {
         let [width, height] = self.size.map(number);
         let title = escape(&self.title);
         let paper = match self.background {
@@ -76,7 +76,7 @@ impl Figure {
     }
 
     /// Returns the largest resolution up to `dpi`, pixels per inch, at which a PNG is possible.
-    pub fn fitting(&self, dpi: u32) -> u32 {
+    pub(crate) fn fitting(&self, dpi: u32) -> u32 {
         let longest = self.size.into_iter().fold(1.0, f64::max);
         // One pixel less, because a pixel cut by the edge counts too.
         dpi.min(((MOST_PIXELS - 1.0) * 72.0 / longest) as u32).max(1)
@@ -86,7 +86,7 @@ impl Figure {
     ///
     /// # Errors
     /// Returns the errors of [`png`](Figure::png).
-    pub fn print(&self) -> Result<Vec<u8>, PictureError> {
+    pub(crate) fn print(&self) -> Result<Vec<u8>, PictureError> {
         self.png(self.fitting(PRINT))
     }
 
@@ -95,7 +95,7 @@ impl Figure {
     /// # Errors
     /// Returns [`PictureError::Figure`] if it would have no pixels or too many, or
     /// [`PictureError::Encode`] if encoding fails.
-    pub fn png(&self, dpi: u32) -> Result<Vec<u8>, PictureError> {
+    pub(crate) fn png(&self, dpi: u32) -> Result<Vec<u8>, PictureError> {
         let scale = f64::from(dpi) / 72.0;
         let [width, height] = self.size.map(|points| (points * scale).ceil());
         let possible = |pixels: f64| (1.0..=MOST_PIXELS).contains(&pixels);

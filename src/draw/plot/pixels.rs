@@ -10,7 +10,7 @@ use tiny_skia::{
 
 impl Canvas {
     /// Draws the elements; `to_pixels` maps points to pixels.
-    pub fn draw(&self, pixmap: &mut Pixmap, to_pixels: Transform) {
+    pub(crate) fn draw(&self, pixmap: &mut Pixmap, to_pixels: Transform) {
         for element in self.elements() {
             match element {
                 Element::Rectangle { at, size, ink } => {

@@ -32,7 +32,7 @@ const DASHES: [Option<[f64; 2]>; 4] = [None, Some([4.0, 1.6]), Some([1.0, 1.6]),
 /// Plots the QD score, coverage and best fitness of runs over their evaluations. Runs that differ
 /// only in the seed become one line, their median, in a band from the least to the largest value,
 /// up to the end of the shortest. Other runs have lines and colours of their own.
-pub fn progress(runs: &[Progress]) -> Figure {
+pub(crate) fn progress(runs: &[Progress]) -> Figure {
     let (_, groups) = alike(runs);
     let mut canvas = Canvas::new();
     let of = names(runs);

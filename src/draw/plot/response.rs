@@ -19,7 +19,7 @@ const FADED: f64 = 0.55;
 
 /// Plots the slopes of a robot's soft voxels and sensors over its body. `of` names the robot,
 /// `task` the task that `taught` estimates.
-pub fn response(found: &RobotResponse, task: Option<&str>, of: &str) -> Figure {
+pub(crate) fn response(found: &RobotResponse, task: Option<&str>, of: &str) -> Figure {
     let mut canvas = Canvas::new();
     let body = &found.body;
     let top = heading(&mut canvas, "Response", of, COLUMN) + 2.0;

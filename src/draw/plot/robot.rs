@@ -13,13 +13,13 @@ use std::collections::BTreeMap;
 const SHADES: f64 = 6.0;
 
 /// Returns a material's colour at rest.
-pub fn plain(material: Material) -> Colour {
+pub(crate) fn plain(material: Material) -> Colour {
     let [_, [red, green, blue], _] = colour::tones(material);
     Colour::new(red, green, blue)
 }
 
 /// Draws squares with thin paper-white seams; squares of equal colour form one path, to save bytes.
-pub fn squares(
+pub(crate) fn squares(
     canvas: &mut Canvas,
     [left, top]: [f64; 2],
     cell: f64,
@@ -41,7 +41,7 @@ pub fn squares(
 const MARKED: f64 = 4.5;
 
 /// Draws the marks of the materials of a body's cells, over squares of these colours.
-pub fn marks(
+pub(crate) fn marks(
     canvas: &mut Canvas,
     [left, top]: [f64; 2],
     cell: f64,
@@ -74,7 +74,7 @@ fn stroked(canvas: &mut Canvas, cell: f64, voxels: impl Iterator<Item = (Materia
 }
 
 /// Outlines the cells of a grid for which `holds` returns true.
-pub fn outline(
+pub(crate) fn outline(
     canvas: &mut Canvas,
     [left, top]: [f64; 2],
     cell: f64,
@@ -104,12 +104,12 @@ pub fn outline(
 }
 
 /// Draws the outline of a body.
-pub fn body_outline(canvas: &mut Canvas, at: [f64; 2], cell: f64, body: &Body, pen: Pen) {
+pub(crate) fn body_outline(canvas: &mut Canvas, at: [f64; 2], cell: f64, body: &Body, pen: Pen) {
     outline(canvas, at, cell, [body.height(), body.width()], |r, c| !body.at(r, c).is_empty(), pen);
 }
 
 /// Draws a framed stimulus, `side` points on its longer side; returns its width and height.
-pub fn stimulus(canvas: &mut Canvas, at: [f64; 2], side: f64, image: &Grid<f64>) -> [f64; 2] {
+pub(crate) fn stimulus(canvas: &mut Canvas, at: [f64; 2], side: f64, image: &Grid<f64>) -> [f64; 2] {
     let cell = side / image.height().max(image.width()).max(1) as f64;
     let size = [cell * image.width() as f64, cell * image.height() as f64];
     canvas.rectangle(at, size, Colour::gray(0.0));
@@ -125,7 +125,7 @@ pub fn stimulus(canvas: &mut Canvas, at: [f64; 2], side: f64, image: &Grid<f64>)
 
 /// Draws the body at a frame with its outline: voxels in the colour of their material, darker the
 /// smaller they are.
-pub fn pose(canvas: &mut Canvas, walk: &Walk, frame: usize, place: impl Fn([f64; 2]) -> [f64; 2]) {
+pub(crate) fn pose(canvas: &mut Canvas, walk: &Walk, frame: usize, place: impl Fn([f64; 2]) -> [f64; 2]) {
     let [small, _, large] = colour::TONE_AREAS;
     let mut paths = BTreeMap::<[u8; 3], Vec<Piece>>::new();
     for (material, corners) in walk.voxels(frame) {
@@ -152,7 +152,7 @@ pub fn pose(canvas: &mut Canvas, walk: &Walk, frame: usize, place: impl Fn([f64;
 }
 
 /// Draws squares with their meanings, one below the other; returns the y below the last.
-pub fn legend<'a>(
+pub(crate) fn legend<'a>(
     canvas: &mut Canvas,
     [x, y]: [f64; 2],
     lines: impl IntoIterator<Item = (Material, Colour, &'a str)>,

@@ -3,13 +3,13 @@
 use crate::draw::colour::Colour;
 
 /// Blue of Okabe & Ito's set.
-pub const BLUE: Colour = Colour::new(0, 114, 178);
+pub(crate) const BLUE: Colour = Colour::new(0, 114, 178);
 /// Vermillion of Okabe & Ito's set.
-pub const VERMILLION: Colour = Colour::new(213, 94, 0);
+pub(crate) const VERMILLION: Colour = Colour::new(213, 94, 0);
 /// Bluish green of Okabe & Ito's set.
-pub const GREEN: Colour = Colour::new(0, 158, 115);
+pub(crate) const GREEN: Colour = Colour::new(0, 158, 115);
 /// Colours for separate lines: Okabe & Ito's set without its yellow.
-pub const SET: [Colour; 6] = [
+pub(crate) const SET: [Colour; 6] = [
     BLUE,
     VERMILLION,
     GREEN,
@@ -18,9 +18,9 @@ pub const SET: [Colour; 6] = [
     Colour::new(230, 159, 0),
 ];
 /// Grid lines.
-pub const GRID: Colour = Colour::new(226, 228, 232);
+pub(crate) const GRID: Colour = Colour::new(226, 228, 232);
 /// Lines around cells.
-pub const CELL: Colour = Colour::new(190, 194, 200);
+pub(crate) const CELL: Colour = Colour::new(190, 194, 200);
 
 /// Viridis (van der Walt & Smith), from dark to bright.
 const VIRIDIS: [[u8; 3]; 11] = [
@@ -54,17 +54,17 @@ const PURPLE_GREEN: [[u8; 3]; 9] = [
 const GRAYS: [[u8; 3]; 2] = [[0x60, 0x62, 0x68], [0xc4, 0xc6, 0xca]];
 
 /// Returns the colour at `t` in [0, 1] of a scale from dark to bright.
-pub fn sequential(t: f64) -> Colour {
+pub(crate) fn sequential(t: f64) -> Colour {
     between(&VIRIDIS, t)
 }
 
 /// Returns the colour at `t` in [−1, 1] of a scale with a neutral middle.
-pub fn diverging(t: f64) -> Colour {
+pub(crate) fn diverging(t: f64) -> Colour {
     between(&PURPLE_GREEN, (t + 1.0) / 2.0)
 }
 
 /// Returns the gray at `t` in [0, 1], from dark to light.
-pub fn below(t: f64) -> Colour {
+pub(crate) fn below(t: f64) -> Colour {
     between(&GRAYS, t)
 }
 

@@ -24,7 +24,7 @@ const FAINTEST: f64 = 0.22;
 ///
 /// # Errors
 /// Returns [`PictureError::Recording`] if the recording cannot be drawn.
-pub fn snapshots(recording: &Recording, every: usize, of: &str) -> Result<Figure, PictureError> {
+pub(crate) fn snapshots(recording: &Recording, every: usize, of: &str) -> Result<Figure, PictureError> {
     let walk = Walk::new(recording)?;
     let phases = recording.phases.len();
     let (columns, width) = if phases <= 3 { (1, COLUMN) } else { (2, PAGE) };

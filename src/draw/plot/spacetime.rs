@@ -32,7 +32,7 @@ const HEIGHTS: [f64; 2] = [90.0, 210.0];
 ///
 /// # Errors
 /// Returns [`PictureError::Recording`] if the recording cannot be drawn.
-pub fn spacetime(recording: &Recording, of: &str) -> Result<Figure, PictureError> {
+pub(crate) fn spacetime(recording: &Recording, of: &str) -> Result<Figure, PictureError> {
     let walk = Walk::new(recording)?;
     let mut rollouts = Vec::<Range<usize>>::new();
     while rollouts.last().map_or(0, |rollout| rollout.end) < walk.len() {

@@ -7,7 +7,7 @@ use std::fmt;
 
 impl Canvas {
     /// Returns the elements as SVG.
-    pub fn svg(&self) -> String {
+    pub(crate) fn svg(&self) -> String {
         self.elements().iter().map(|element| format!("{element}\n")).collect()
     }
 }
@@ -93,13 +93,13 @@ impl fmt::Display for Piece {
 }
 
 /// Formats a number with at most two decimals; NaN and extreme values become drawable ones.
-pub fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     let text = number::fixed(drawable(value), 2);
     text.trim_end_matches('0').trim_end_matches('.').to_string()
 }
 
 /// Escapes a text for XML.
-pub fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for letter in text.chars() {
         match letter {

@@ -21,7 +21,7 @@ struct Line {
 
 /// Plots accuracy on held-out images by the varied settings: a dot per seed with its 95 % interval,
 /// the mean of several seeds, a line per task. Returns `None` if no run was tested.
-pub fn sweep(name: &str, rows: &[SweepRow]) -> Option<Figure> {
+pub(crate) fn sweep(name: &str, rows: &[SweepRow]) -> Option<Figure> {
     let mut lines: Vec<Line> = Vec::new();
     let mut images = None;
     for row in rows {

@@ -35,7 +35,7 @@ pub(super) fn played(dossier: &Dossier, most: usize) -> Vec<&Robot> {
 
 impl Rollouts {
     /// Simulates and packs the rollouts.
-    pub fn record(
+    pub(crate) fn record(
         gathered: &Gathered,
         most: usize,
         simulated: &(dyn Fn() + Sync),
@@ -61,12 +61,12 @@ impl Rollouts {
     }
 
     /// Returns the id of the element with a robot's rollout.
-    pub fn id(&self, run: usize, robot: &str) -> Option<String> {
+    pub(crate) fn id(&self, run: usize, robot: &str) -> Option<String> {
         self.0.contains_key(&(run, robot.to_string())).then(|| format!("rollout-{run}-{robot}"))
     }
 
     /// Returns the elements that hold the rollouts.
-    pub fn elements(&self) -> String {
+    pub(crate) fn elements(&self) -> String {
         let element = |((run, robot), rollout): (&(usize, String), &String)| {
             format!("<script type=\"text/plain\" id=\"rollout-{run}-{}\">{rollout}</script>\n", escape(robot))
         };

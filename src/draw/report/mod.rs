@@ -21,22 +21,22 @@ const SCRIPT: &str =
     concat!(include_str!("../drawing.js"), include_str!("../stages.js"), include_str!("report.js"));
 
 /// Spells a command as its users type it.
-pub type Spell<'a> = &'a dyn Fn(&Invocation) -> String;
+pub(crate) type Spell<'a> = &'a dyn Fn(&Invocation) -> String;
 
 /// The content of a page.
 #[derive(Clone, Copy)]
-pub struct Content<'a> {
+pub(crate) struct Content<'a> {
     /// The runs and the findings about them.
-    pub gathered: &'a Gathered,
+    pub(crate) gathered: &'a Gathered,
     /// Maximum number of robots of each run that can be played, the fittest first.
-    pub rollouts: usize,
+    pub(crate) rollouts: usize,
     /// Spells the commands that reproduce the results.
-    pub spell: Spell<'a>,
+    pub(crate) spell: Spell<'a>,
 }
 
 impl Content<'_> {
     /// Returns the number of rollouts to simulate for the page.
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         let of_runs: usize =
             self.gathered.runs.iter().map(|dossier| maps::played(dossier, self.rollouts).len()).sum();
         of_runs + self.gathered.team.as_ref().map_or(0, team::count)
@@ -46,7 +46,7 @@ impl Content<'_> {
     ///
     /// # Errors
     /// Returns an error if a rollout cannot be drawn.
-    pub fn page(&self, simulated: &(dyn Fn(u64) + Sync)) -> Result<String, PictureError> {
+    pub(crate) fn page(&self, simulated: &(dyn Fn(u64) + Sync)) -> Result<String, PictureError> {
         let Gathered { runs, together, team } = self.gathered;
         let done = AtomicU64::new(0);
         let simulated = || simulated(done.fetch_add(1, Ordering::Relaxed) + 1);
