@@ -51,9 +51,12 @@ pub(super) struct AuditArgs {
     /// Criteria: a TOML file (or JSON); missing keys have their defaults.
     #[arg(long, value_name = "FILE")]
     criteria: Option<PathBuf>,
-    /// Change a criterion, such as threshold=2 or perturbations.time_step=[2,4]; without a value,
-    /// it is reset to its default; may be given several times.
-    #[arg(long, value_name = "KEY=VALUE")]
+    #[arg(
+        long,
+        value_name = "KEY=VALUE",
+        help = "Change a criterion, such as threshold=2 or perturbations.time_step=[2,4]; without \
+                a value, it is reset to its default; may be given several times"
+    )]
     set: Vec<String>,
     /// Repeat audits of robots that have verdicts.
     #[arg(long)]

@@ -35,9 +35,13 @@ pub(super) struct ReproduceArgs {
     /// More than 0, up to 1: multiplies generations; its square root, test images and trainings.
     #[arg(long, default_value_t = 1.0, value_parser = decimal())]
     scale: f64,
-    /// Change a key, such as seeds=[1,2] or experiment.1.config=mine.toml (experiments are counted
-    /// from 1); without a value, it is reset to its default; may be given several times.
-    #[arg(long, value_name = "KEY=VALUE")]
+    #[arg(
+        long,
+        value_name = "KEY=VALUE",
+        help = "Change a key, such as seeds=[1,2] or experiment.1.config=mine.toml (experiments \
+                are counted from 1); without a value, it is reset to its default; may be given \
+                several times"
+    )]
     set: Vec<String>,
     /// Folder for all results.
     #[arg(short, long, value_name = "DIR", default_value = "reproduction")]

@@ -48,9 +48,12 @@ tasks are done; 1: some failed; 75: stopped.";
 pub(super) struct SweepArgs {
     /// Plan file (TOML or JSON; morphcog schema sweep has its keys).
     plan: PathBuf,
-    /// Change a key of the plan, such as seeds=[1,2]; without a value, it is reset to its default;
-    /// may be given several times.
-    #[arg(long, value_name = "KEY=VALUE")]
+    #[arg(
+        long,
+        value_name = "KEY=VALUE",
+        help = "Change a key of the plan, such as seeds=[1,2]; without a value, it is reset to its \
+                default; may be given several times"
+    )]
     set: Vec<String>,
     /// Folder for all run folders (default: runs/<plan>).
     #[arg(short, long, value_name = "DIR")]

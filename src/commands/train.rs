@@ -55,9 +55,9 @@ pub struct TrainOptions {
 #[derive(Clone, Debug)]
 pub struct TrainOutcome {
     /// The run as written to `run.json`.
-    pub(crate) run: RunFile,
+    pub run: RunFile,
     /// Total number of rollouts simulated, without validation.
-    pub(crate) rollouts: usize,
+    pub rollouts: usize,
     /// Height and width of the training images.
     pub(crate) size: [usize; 2],
     /// Results on validation images; `None` if validation was stopped.

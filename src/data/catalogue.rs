@@ -67,7 +67,7 @@ const MNIST_UNPACKED: [&str; 4] = [
 ];
 
 /// SHA-256 of the content of MNIST's training and test split, however it is packed (see
-/// [`Split::fingerprint`](crate::data::info::Split::fingerprint)).
+/// [`Dataset::fingerprint`](crate::data::dataset::Dataset::fingerprint)).
 pub(crate) const MNIST_CONTENT: [&str; 2] = [
     "c5097fdd51cfdbe7695fd9df3612695696864b5c424f58d843ffdc5d335e9914",
     "18489308deedfe2f7bd3a11e599a597126f161d991b1ffcffb71642aa76f7f62",

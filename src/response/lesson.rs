@@ -1,5 +1,5 @@
 //! The design problem: choose the sensor at each place that makes the mean margin over two groups
-//! of images largest, if displacements follow the slopes of the [response](super::response).
+//! of images largest, if displacements follow the slopes of the [response](super::regression).
 
 use crate::base::Grid;
 use crate::base::random::Stream;

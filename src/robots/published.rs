@@ -83,7 +83,7 @@ pub fn gallery() -> Result<Vec<Published>, Error> {
 /// Finds a published robot by name, ignoring case.
 ///
 /// # Errors
-/// As [`gallery`].
+/// As [`gallery()`].
 pub fn find(name: &str) -> Result<Option<Published>, Error> {
     Ok(gallery()?.into_iter().find(|robot| robot.name.eq_ignore_ascii_case(name)))
 }
@@ -101,7 +101,7 @@ pub fn config() -> Result<Config, Error> {
 /// "gallery".
 ///
 /// # Errors
-/// As [`gallery`]; also if only some of the names are published.
+/// As [`gallery()`]; also if only some of the names are published.
 pub(crate) fn is_meant(selection: &Selection) -> Result<bool, Error> {
     let Selection::Ids(ids) = selection else { return Ok(false) };
     if matches!(ids.as_slice(), [word] if word == ALL) {

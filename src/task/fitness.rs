@@ -4,7 +4,7 @@ use crate::task::perturbation::CONDITIONS_OF_RESPONSE;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// One of the two groups of a [`Split`].
+/// One of the two groups of a [`ClassSplit`](crate::task::grouping::ClassSplit).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Group {
     /// The first, named before the bar.

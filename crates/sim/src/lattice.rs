@@ -79,11 +79,11 @@ pub(crate) struct Lattice {
     pub(crate) present: Buffer,
     /// Whole blocks of slots with a point or a spring; the others need no work.
     pub(crate) active_ranges: Vec<Range<usize>>,
-    /// Rest length of each family's springs [wu].
+    /// Rest length of each family's springs \[wu\].
     pub(crate) lengths: [f64; FAMILIES],
     /// Stiffness of every spring ([`spring_index`]), 0 where there is none.
     pub(crate) stiffness: Buffer,
-    /// Bit mask of every spring: all bits but the sign's, or 0 (see [`Lanes::bits_and`]).
+    /// Bit mask of every spring: all bits but the sign's, or 0 (see `Lanes::bits_and`).
     pub(crate) exists: Buffer,
     pub(crate) off_lattice_springs: Vec<OffLatticeSpring>,
     pub(crate) actuated: Vec<ActuatedSide>,

@@ -24,7 +24,7 @@ pub(crate) struct Work {
 /// Memory of a substep, allocated once.
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
-    /// Goal lengths [wu]: horizontal springs by slot, then off-lattice springs.
+    /// Goal lengths \[wu\]: horizontal springs by slot, then off-lattice springs.
     pub goals: Buffer,
     /// Springs by blocks.
     pub springs: Vec<Springs>,

@@ -3,7 +3,7 @@
 use crate::simd::Buffer;
 use crate::system::System;
 
-/// Height at which slots without a point are parked [wu]: far from every point, above the floor.
+/// Height at which slots without a point are parked \[wu\]: far from every point, above the floor.
 const PARKED: f64 = 1e6;
 
 /// The two axes, as indices of a [`Pair`].

@@ -22,7 +22,7 @@ const BELOW: f64 = 24.0;
 const STRIPS: [&str; 2] = ["strips in a square:", "total voxels, few to many"];
 
 /// Plots the fitness of the elites of a run, one map per task.
-pub(crate) fn archive(run: &RunFile) -> Figure {
+pub fn archive(run: &RunFile) -> Figure {
     let tasks = run.dimensions.tasks.len().max(1);
     let scale = Scale::of(run);
     let mut canvas = Canvas::new();

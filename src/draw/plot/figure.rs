@@ -8,11 +8,11 @@ use crate::draw::plot::svg::{escape, number};
 use tiny_skia::{Color, Pixmap, Transform};
 
 /// Width of a journal's column: 85 mm in points.
-pub const COLUMN: f64 = 241.0;
+pub(crate) const COLUMN: f64 = 241.0;
 /// Width of a journal's page: 178 mm in points.
-pub const PAGE: f64 = 504.0;
+pub(crate) const PAGE: f64 = 504.0;
 /// Pixels per inch of pictures for print.
-pub const PRINT: u32 = 300;
+pub(crate) const PRINT: u32 = 300;
 /// Maximum number of pixels on a side of a PNG.
 const MOST_PIXELS: f64 = 16_000.0;
 
@@ -57,7 +57,7 @@ impl Figure {
     }
 
     /// Returns the figure as SVG: one element `svg`, for a file or for a page.
-    pub(crate) fn svg(&self) -> String {
+    pub fn svg(&self) -> String {
         let [width, height] = self.size.map(number);
         let title = escape(&self.title);
         let paper = match self.background {

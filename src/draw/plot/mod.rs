@@ -22,10 +22,11 @@ mod sweep;
 mod team;
 
 pub(crate) use accuracy::accuracy;
-pub(crate) use archive::archive;
+pub use archive::archive;
 pub(crate) use body::body;
 pub(crate) use capacity::capacity;
-pub use figure::{Background, COLUMN, Figure, PAGE, PRINT};
+pub use figure::{Background, Figure};
+pub(crate) use figure::{COLUMN, PRINT};
 pub(crate) use progress::progress;
 pub(crate) use response::response;
 pub(crate) use scales::{below, sequential};

@@ -7,7 +7,7 @@ use std::fmt;
 
 impl Canvas {
     /// Returns the elements as SVG.
-    pub(crate) fn svg(&self) -> String {
+    pub fn svg(&self) -> String {
         self.elements().iter().map(|element| format!("{element}\n")).collect()
     }
 }
