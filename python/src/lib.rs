@@ -217,7 +217,9 @@ impl Observer for Heard {
 
     fn progress(&self, done: u64) {
         let mut said = self.said();
-        let Some((work, recent)) = &mut said.work else { return };
+        let Some((work, recent)) = &mut said.work else {
+            return;
+        };
         let (seconds, before) = recent.since(self.seconds(), done, |done| *done);
         let line = count_line(&work.label, [before, done, work.total], work.unit, seconds);
         said.moved(line);
@@ -428,7 +430,7 @@ impl RunData {
         let _environment = entered()?;
         let (page, still) = self.shown(py, robot, |replay, title| {
             let walk = Walk::new(&replay.recording)?;
-            let still = gif::still(&walk, walk.len() - 1, WIDTH)?;
+            let still = gif::still(&walk, walk.frames() - 1, WIDTH)?;
             Ok((html::small_page(&replay.recording, title, &replay.about)?, still))
         })?;
         Ok((page, PyBytes::new(py, &still)))
@@ -635,7 +637,9 @@ fn images<'py>(
     let split = match split {
         "train" => Split::Train,
         "test" => Split::Test,
-        other => return Err(refused(format!("split={other:?}: expected \"train\" or \"test\""))),
+        other => {
+            return Err(refused(format!("split={other:?}: expected \"train\" or \"test\"")));
+        }
     };
     let places = places(data.as_deref(), std::env::var_os("MORPHCOG_DATA"), None);
     let failed = |error: DatasetError| raised(&Error::from(error));

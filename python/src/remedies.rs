@@ -50,6 +50,8 @@ fn words(remedy: &Remedy) -> String {
         Remedy::NameMirror => "name another mirror".to_string(),
         Remedy::ChoosePort => "name another port, or leave it out to take a free one".to_string(),
         Remedy::NameRobot(id) => format!("name one, such as {id}"),
-        Remedy::FreeSpace(folder) => format!("make space on the disk that {} is on", folder.display()),
+        Remedy::FreeSpace(folder) => {
+            format!("make space on the disk that {} is on", folder.display())
+        }
     }
 }

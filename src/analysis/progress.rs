@@ -69,7 +69,9 @@ fn spoken(value: &toml::Value) -> String {
         list.as_array()?.iter().map(|class| class.as_integer().and_then(|c| u8::try_from(c).ok())).collect()
     };
     let groups = || -> Option<String> {
-        let [a, b] = value.as_array()?.as_slice() else { return None };
+        let [a, b] = value.as_array()?.as_slice() else {
+            return None;
+        };
         Some(groups_text([&classes(a)?, &classes(b)?], "|"))
     };
     groups().unwrap_or_else(|| value.as_str().map_or_else(|| value.to_string(), str::to_string))

@@ -113,7 +113,9 @@ impl<'a> Columns<'a> {
 
     /// Of a row.
     pub(crate) fn of(row: &'a SweepRow) -> Self {
-        let Some(run) = &row.run else { return Columns::default() };
+        let Some(run) = &row.run else {
+            return Columns::default();
+        };
         let tested = run.tested.as_ref();
         let interval = tested.and_then(|tested| tested.interval);
         Columns {

@@ -180,7 +180,9 @@ fn temporary_of(name: &str) -> Option<&str> {
 /// Removes temporary files of killed writers. Ignores failures: the file itself is written.
 fn remove_left_behind(path: &Path) {
     let own = inner_name(path).to_string_lossy();
-    let Ok(entries) = std::fs::read_dir(folder_of(path)) else { return };
+    let Ok(entries) = std::fs::read_dir(folder_of(path)) else {
+        return;
+    };
     for entry in entries.flatten() {
         let is_own = temporary_of(&entry.file_name().to_string_lossy()).is_some_and(|name| name == own);
         if is_own && is_left_behind(&entry).unwrap_or(false) {

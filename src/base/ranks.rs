@@ -101,7 +101,7 @@ impl Ranks {
     }
 
     /// Returns the leading rank's value. Every rank must call it, or the others block.
-    pub(crate) fn from_lead<T: Serialize + DeserializeOwned>(self, own: Option<T>) -> Option<T> {
+    pub(crate) fn broadcast<T: Serialize + DeserializeOwned>(self, own: Option<T>) -> Option<T> {
         self.share(own).swap_remove(0)
     }
 
@@ -217,6 +217,6 @@ mod tests {
     #[test]
     fn a_process_alone_shares_with_itself() {
         assert_eq!(Ranks::ALONE.share(vec![1.5, -0.0]), [vec![1.5, -0.0]]);
-        assert_eq!(Ranks::ALONE.from_lead(Some(7)), Some(7));
+        assert_eq!(Ranks::ALONE.broadcast(Some(7)), Some(7));
     }
 }

@@ -94,7 +94,9 @@ pub(super) fn warn_of_versions<'a>(archives: impl IntoIterator<Item = &'a PathBu
     let of_others: Vec<(PathBuf, String)> = meant(archives)
         .filter_map(|path| RunFile::other_version(&path).map(|version| (path, version)))
         .collect();
-    let Some(((path, _), others)) = of_others.split_first() else { return };
+    let Some(((path, _), others)) = of_others.split_first() else {
+        return;
+    };
     let more = match others.len() {
         0 => String::new(),
         more => format!(" and {}", counted(more, "other run", "other runs")),

@@ -80,7 +80,9 @@ fn words(remedy: &Remedy) -> String {
         Remedy::NameMirror => "name another mirror with --mirror".to_string(),
         Remedy::ChoosePort => "name another with --port, or leave it out to take a free one".to_string(),
         Remedy::NameRobot(id) => format!("name one, as in --robot {id}"),
-        Remedy::FreeSpace(folder) => format!("make space on the disk that {} is on", folder.display()),
+        Remedy::FreeSpace(folder) => {
+            format!("make space on the disk that {} is on", folder.display())
+        }
     }
 }
 

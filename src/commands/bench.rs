@@ -47,7 +47,9 @@ pub fn specimens() -> Vec<Specimen> {
         2 => MuscleAntiphase,
         _ => SensorShrink,
     };
-    let soft = move |r: usize, c: usize| if (r / 3 + c / 3).is_multiple_of(2) { Soft } else { active(r, c) };
+    let soft = move |r: usize, c: usize| {
+        if (r / 3 + c / 3).is_multiple_of(2) { Soft } else { active(r, c) }
+    };
     let kinds: [(&'static str, Box<Pattern>); 5] = [
         ("full, soft and active", Box::new(soft)),
         (

@@ -128,7 +128,9 @@ pub fn eval(options: &EvalOptions, session: &Session) -> Result<EvalOutcome, Err
 /// Returns the results in the file if they are of this very test: same program version, runs,
 /// robots, images, conditions and threshold. Fails as [`eval`] does.
 pub(crate) fn known(options: &EvalOptions, session: &Session) -> Result<Option<EvalFile>, Error> {
-    let Ok(known) = EvalFile::read(&options.out) else { return Ok(None) };
+    let Ok(known) = EvalFile::read(&options.out) else {
+        return Ok(None);
+    };
     let opened = Opened::new(options, session)?;
     let shown = HeldOutImages::draw(&opened.config, &opened.sources, &opened.dataset, options.draw())?;
     let is_it = !known.stopped

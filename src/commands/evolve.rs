@@ -102,7 +102,7 @@ pub fn evolve(options: &EvolveOptions, session: &Session) -> Result<EvolveOutcom
         }
         _ => None,
     };
-    let saved = ranks.from_lead(saved);
+    let saved = ranks.broadcast(saved);
     if let Some(folder) = &folder {
         folder.write_config(config)?;
         whereabouts::remember(folder, &dataset)?;

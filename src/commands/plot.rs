@@ -231,7 +231,9 @@ fn possible(figure: &Figure, dpi: u32) -> Result<(), Error> {
 /// # Errors
 /// Returns an error if the extension is not that of a figure.
 pub(crate) fn endings(out: Option<&Path>) -> Result<Vec<&'static str>, Error> {
-    let Some(path) = out else { return Ok(vec!["svg", "png"]) };
+    let Some(path) = out else {
+        return Ok(vec!["svg", "png"]);
+    };
     folder::of_file(path)?;
     match path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).as_deref() {
         None => Ok(vec!["svg", "png"]),

@@ -38,7 +38,9 @@ impl FromStr for ShownImage {
             Some(("test", digits)) => (Split::Test, digits),
             Some(("train", digits)) => (Split::Train, digits),
             None => (Split::Train, text),
-            Some((other, _)) => return Err(format!("{other}: expected train or test before the colon")),
+            Some((other, _)) => {
+                return Err(format!("{other}: expected train or test before the colon"));
+            }
         };
         let index =
             digits.trim().parse().map_err(|_| format!("{text}: expected an index, as 3 or test:17"))?;

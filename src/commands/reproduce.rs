@@ -145,7 +145,9 @@ impl Job<'_> {
         let of_seed =
             |seed: &u64| StoredRun::read(&self.place.out.join(format!("{name}-seed{seed}")).join(RUN_JSON));
         let sources: Vec<StoredRun> = self.plan.seeds.iter().map(of_seed).collect::<Result<_, _>>()?;
-        let Some((chosen, audited)) = self.chosen(&sources)? else { return Ok(None) };
+        let Some((chosen, audited)) = self.chosen(&sources)? else {
+            return Ok(None);
+        };
         let (tasks, grouping) = (&sources[0].run.dimensions.tasks, config.grouping()?);
         let tasks: Vec<&String> = tasks
             .iter()
@@ -163,7 +165,9 @@ impl Job<'_> {
             return Ok(Some((rows, None)));
         }
         let path = self.place.out.join(format!("{name}-eval.json"));
-        let Some(report) = self.tested(name, &path, &sources, &chosen)? else { return Ok(None) };
+        let Some(report) = self.tested(name, &path, &sources, &chosen)? else {
+            return Ok(None);
+        };
         self.session.observer.note(&format!("{name}: networks"));
         let options = capacity::CapacityOptions {
             eval: path.clone(),
@@ -201,7 +205,9 @@ impl Job<'_> {
                 self.session
                     .observer
                     .note(&format!("{task}: audit of {}", counted(drawn.len(), "robot", "robots")));
-                let Some(verdicts) = self.audited(sources, &drawn)? else { return Ok(None) };
+                let Some(verdicts) = self.audited(sources, &drawn)? else {
+                    return Ok(None);
+                };
                 for (candidate, verdict) in drawn.into_iter().zip(verdicts) {
                     if physical.len() >= self.plan.robots {
                         break;

@@ -285,7 +285,9 @@ fn task(
     seed: u64,
     session: &Session,
 ) -> Result<Option<Task>, Error> {
-    let Some(groups) = &options.task else { return Ok(None) };
+    let Some(groups) = &options.task else {
+        return Ok(None);
+    };
     let config = training::config_of(&provenance.config, groups.classes(), Some(seed), &options.set)?;
     let whereabouts = Whereabouts::given(session.folder()).and_of(&options.archive);
     same_walks(&provenance.config, &config)?;
@@ -459,7 +461,9 @@ impl Measuring<'_> {
             })?);
             progress(rollouts.min(options.images), known.len().min(options.images));
             session.check()?;
-            let Some(response) = probing::response(&shown, rollouts) else { return Ok(None) };
+            let Some(response) = probing::response(&shown, rollouts) else {
+                return Ok(None);
+            };
             let ended_by = if response.relative_error() <= options.error {
                 EndedBy::Error
             } else if rollouts == most {

@@ -137,7 +137,9 @@ impl Scenario {
             (_, Some(_), None | Some(0)) => {
                 return refuse("switch_every: expected 1 or more control steps with stimuli".to_string());
             }
-            (_, None, Some(_)) => return refuse("switch_every: expected only with stimuli".to_string()),
+            (_, None, Some(_)) => {
+                return refuse("switch_every: expected only with stimuli".to_string());
+            }
             (_, None, _) if self.reset_between => {
                 return refuse("reset_between: expected only with stimuli".to_string());
             }

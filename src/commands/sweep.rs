@@ -365,7 +365,9 @@ fn text(value: &toml::Value) -> String {
 /// Formats a value for a file name, so that shells and file systems take it unchanged.
 fn word(value: &toml::Value) -> String {
     let text = text(value);
-    let plain = |c: char| if c.is_ascii_alphanumeric() || "._+-".contains(c) { c } else { '_' };
+    let plain = |c: char| {
+        if c.is_ascii_alphanumeric() || "._+-".contains(c) { c } else { '_' }
+    };
     let word: String = text.chars().map(plain).collect();
     let is_same = word == text && !word.is_empty() && word.len() <= LONGEST;
     // Two texts that become the same word are still two values.

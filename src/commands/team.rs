@@ -295,7 +295,9 @@ fn baselines(
     dataset: &Dataset,
     split: Split,
 ) -> Result<Option<TeamBaselines>, Error> {
-    let Some((place, best_body)) = file.best_body() else { return Ok(None) };
+    let Some((place, best_body)) = file.best_body() else {
+        return Ok(None);
+    };
     let configs = robots.iter().map(|chosen| &sources[chosen.source].run.config);
     let common = Config::together(configs).expect("every class of a team has a robot");
     let classes = &file.classes;

@@ -191,7 +191,9 @@ impl Kind {
         match self {
             Kind::Null => "nothing".to_string(),
             Kind::Boolean => "true or false".to_string(),
-            Kind::Integer(Some(least), Some(largest)) => format!("a whole number from {least} to {largest}"),
+            Kind::Integer(Some(least), Some(largest)) => {
+                format!("a whole number from {least} to {largest}")
+            }
             Kind::Integer(Some(least), None) => format!("a whole number from {least}"),
             Kind::Integer(..) => "a whole number".to_string(),
             Kind::Number => "a number".to_string(),

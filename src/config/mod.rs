@@ -123,7 +123,9 @@ pub(crate) fn differing(there: &Settings, now: &Settings) -> Vec<(String, String
 pub(crate) fn flatten(name: &str, value: toml::Value, settings: &mut Settings) {
     match value {
         toml::Value::Table(table) => {
-            let below = |key: String| if name.is_empty() { key } else { format!("{name}.{key}") };
+            let below = |key: String| {
+                if name.is_empty() { key } else { format!("{name}.{key}") }
+            };
             table.into_iter().for_each(|(key, value)| flatten(&below(key), value, settings));
         }
         value => {

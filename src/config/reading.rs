@@ -357,7 +357,9 @@ fn set<T: JsonSchema>(root: &mut toml::Value, assignment: &str) -> Result<(), St
                 }
                 &mut list[index]
             }
-            _ => return Err(format!("{key} is not a key: there is nothing below {before}")),
+            _ => {
+                return Err(format!("{key} is not a key: there is nothing below {before}"));
+            }
         };
         if !before.is_empty() {
             before.push('.');

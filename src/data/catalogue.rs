@@ -110,7 +110,9 @@ impl Catalogue {
         let (mirrors, files, unpacked): (&[&str], _, _) = match name {
             "mnist" => (&MNIST_MIRRORS, MNIST, MNIST_UNPACKED.map(Some)),
             "fashion-mnist" => (&FASHION_MNIST_MIRRORS, FASHION_MNIST, [None; 4]),
-            _ => return Err(UnknownDataset { name: name.to_string() }),
+            _ => {
+                return Err(UnknownDataset { name: name.to_string() });
+            }
         };
         let file = |((name, bytes, sha256), content): ((&str, u64, &str), Option<&str>)| RemoteFile {
             name: name.to_string(),

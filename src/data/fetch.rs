@@ -404,7 +404,9 @@ fn download(
         let text = last_line(program, &String::from_utf8_lossy(&said));
         match (status.success(), text) {
             (false, Some(text)) => return Err(failed(text)),
-            (false, None) if found == 0 || found == expected => return Err(failed(status.to_string())),
+            (false, None) if found == 0 || found == expected => {
+                return Err(failed(status.to_string()));
+            }
             _ => (),
         }
     }

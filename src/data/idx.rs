@@ -305,7 +305,9 @@ fn decode<const N: usize>(
         [0, 0, UNSIGNED_BYTE, found] => {
             return Err(IdxError::Dimensions { file, expected: dimensions, what, found });
         }
-        found => return Err(IdxError::Magic { file, dimensions, what, found }),
+        found => {
+            return Err(IdxError::Magic { file, dimensions, what, found });
+        }
     }
     content.by_ref().take(4 * N as u64).read_to_end(&mut header).map_err(broken)?;
     if header.len() < length {

@@ -131,7 +131,9 @@ pub(crate) fn lines(text: &str, size: f64, bold: bool, most: f64, count: usize) 
     let mut rest = text;
     while lines.len() + 1 < count && width(rest, size, bold) > most {
         let blanks = rest.match_indices(' ').map(|(at, _)| at);
-        let Some(end) = blanks.take_while(|at| width(&rest[..*at], size, bold) <= most).last() else { break };
+        let Some(end) = blanks.take_while(|at| width(&rest[..*at], size, bold) <= most).last() else {
+            break;
+        };
         lines.push(rest[..end].to_string());
         rest = rest[end..].trim_start();
     }

@@ -84,8 +84,9 @@ fn encoded(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, Pictu
     let (width, height) = (stage.width as u16, stage.height as u16);
     let mut encoder = Encoder::new(Vec::new(), width, height, &colours).map_err(failed)?;
     encoder.set_repeat(Repeat::Infinite).map_err(|e| PictureError::Encode(e.to_string()))?;
-    let centiseconds =
-        |seconds: f64| if seconds > 0.0 { (100.0 * seconds).round().min(6e3) as u16 } else { 0 };
+    let centiseconds = |seconds: f64| {
+        if seconds > 0.0 { (100.0 * seconds).round().min(6e3) as u16 } else { 0 }
+    };
     // Delays are whole hundredths of a second, rounded so that their sum stays correct.
     let until = |frame: usize| f64::from(centiseconds(1.0)) * frame as f64 / options.fps.max(0.1);
     let delay = |frame: usize| ((until(frame + 1).round() - until(frame).round()).min(6e3) as u16).max(2);

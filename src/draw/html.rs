@@ -71,7 +71,7 @@ pub fn small_page(
     metadata: &[(String, String)],
 ) -> Result<String, PictureError> {
     let walk = Walk::new(recording)?;
-    let coordinates = walk.len() * 2 * points(recording);
+    let coordinates = walk.frames() * 2 * points(recording);
     let (mut rollout, positions) = moments(&walk, coordinates.div_ceil(SMALL).max(1), COARSE_STEPS);
     rollout["positions"] = packed_bytes(&differences(&positions, 2 * points(recording)))?.into();
     rollout["small"] = true.into();
@@ -158,7 +158,7 @@ fn points(recording: &Recording) -> usize {
 /// Returns the recording in the format of the page's script. Longer rollouts keep fewer frames, so
 /// that positions take at most `most` bytes.
 fn rollout(walk: &Walk, most: usize) -> Value {
-    let every = (walk.len() * points(walk.recording()) * 4).div_ceil(most.max(1)).max(1);
+    let every = (walk.frames() * points(walk.recording()) * 4).div_ceil(most.max(1)).max(1);
     let (mut rollout, positions) = moments(walk, every, STEPS);
     rollout["positions"] = BASE64.encode(bytes(positions.into_iter().map(i16::to_le_bytes))).into();
     rollout

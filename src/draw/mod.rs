@@ -37,8 +37,9 @@ pub(crate) fn simulated(
     use crate::task::rollout::record;
     let body: Body = body.parse().expect("tests name bodies");
     let image = |phase: usize| {
-        let pixel =
-            |row: usize, column: usize| if (row + column + phase).is_multiple_of(3) { 1.0 } else { 0.0 };
+        let pixel = |row: usize, column: usize| {
+            if (row + column + phase).is_multiple_of(3) { 1.0 } else { 0.0 }
+        };
         let stimulus = Grid::from_fn(body.height(), body.width(), pixel);
         let label = format!("{} (train {})", phase % 2, 2 * phase + 1);
         LabelledStimulus { class: (phase % 2) as u8, label, stimulus }

@@ -49,7 +49,7 @@ pub(crate) fn least_width(walk: &Walk) -> f64 {
     let recording = walk.recording();
     let large = |text: &str| fonts::width(text, LARGE, true);
     let small = |text: &str| fonts::width(text, SMALL, false);
-    let farthest = (0..walk.len()).map(|frame| walk.displacement(frame).abs()).fold(0.0, f64::max);
+    let farthest = (0..walk.frames()).map(|frame| walk.displacement(frame).abs()).fold(0.0, f64::max);
     let distance = large(&format!("← {}", signed(-farthest))) + BEFORE_UNIT + small(UNIT);
     let ends = (0..recording.phases.len()).map(|phase| walk.phase_frames(phase).end - 1);
     let time = ends.map(|frame| readout(walk, frame).time).max_by_key(String::len).unwrap_or_default();
@@ -80,7 +80,7 @@ pub(crate) struct Caption {
 pub(crate) fn readout(walk: &Walk, frame: usize) -> Caption {
     let frames = walk.phase_frames(walk.phase_index(frame));
     // A phase that continues into the next ends with the first frame of that phase.
-    let goes_on = frames.end < walk.len() && !walk.is_fresh(walk.phase_index(frame) + 1);
+    let goes_on = frames.end < walk.frames() && !walk.is_fresh(walk.phase_index(frame) + 1);
     let last = if goes_on { frames.end } else { frames.end.saturating_sub(1) };
     let step = frame.saturating_sub(frames.start);
     let cycles = step as f64 / walk.recording().cycle.max(1) as f64;
@@ -240,7 +240,7 @@ mod tests {
             let first = readout(&walk, walk.phase_frames(1).start);
             assert_eq!(first.time, "step 0/100 · cycle 0.0");
             assert_eq!(first.displacement.trim(), "0.00");
-            let last = readout(&walk, walk.len() - 1);
+            let last = readout(&walk, walk.frames() - 1);
             assert_eq!(last.time, "step 100/100 · cycle 2.0");
             let walked = recording.phases[1].displacement;
             let arrow = if walked > 0.0 { "→" } else { "←" };

@@ -146,7 +146,7 @@ mod tests {
         recording.unstable = true;
         let walk = Walk::new(&recording).unwrap();
         let stage = Stage::new(&walk, 480).unwrap();
-        for frame in 0..walk.len() {
+        for frame in 0..walk.frames() {
             assert_eq!(picture(&walk, frame, &stage).unwrap().width(), 480);
         }
     }

@@ -56,7 +56,7 @@ impl Stage {
         let zoom = (f64::from(width) / 480.0).round().min((f64::from(width) / least).floor()).max(1.0);
         let has_legend = f64::from(width) >= least * zoom;
         let (smallest, largest) = (VOXEL.start() * zoom, VOXEL.end() * zoom);
-        let (first, all) = (walk.extent(0..1), walk.extent(0..walk.len()));
+        let (first, all) = (walk.extent(0..1), walk.extent(0..walk.frames()));
         let size = (first.right - first.left).clamp(1.0, 128.0);
         let standing = first.top.clamp(1.0, 128.0);
         // Leaves room for hops; a body that is thrown higher leaves the picture for a moment.
@@ -73,7 +73,7 @@ impl Stage {
         let middle = if follow {
             followed(walk, 0.3 * f64::from(width) / scale)
         } else {
-            vec![(left + right) / 2.0; walk.len()]
+            vec![(left + right) / 2.0; walk.frames()]
         };
         // Whole pixels, so that the ground scrolls without flicker.
         let snap = |x: f64| ((x * scale - f64::from(width) / 2.0).round()) / scale;
@@ -129,9 +129,9 @@ impl Stage {
 /// Returns the leftmost and rightmost x of the walk. A body that breaks apart counts only up to
 /// about a body width beyond its centre.
 fn reach(walk: &Walk) -> (f64, f64) {
-    let all = walk.extent(0..walk.len());
+    let all = walk.extent(0..walk.frames());
     let size = walk.recording().body.width() as f64;
-    let centres = (0..walk.len()).map(|f| walk.centre(f)[0]);
+    let centres = (0..walk.frames()).map(|f| walk.centre(f)[0]);
     let (low, high) = centres.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
     (all.left.max(low - size - 2.0).min(low), all.right.min(high + size + 2.0).max(high))
 }
@@ -140,7 +140,7 @@ fn reach(walk: &Walk) -> (f64, f64) {
 /// sides, each rollout by itself. It stays within `most` voxel lengths of the centre, which keeps a
 /// body that is hurled away in view.
 fn followed(walk: &Walk, most: f64) -> Vec<f64> {
-    let mut path: Vec<f64> = (0..walk.len()).map(|f| walk.centre(f)[0]).collect();
+    let mut path: Vec<f64> = (0..walk.frames()).map(|f| walk.centre(f)[0]).collect();
     let mut start = 0;
     while start < path.len() {
         let rollout = walk.rollout(start);
@@ -180,8 +180,8 @@ mod tests {
         let recording = simulated("3344/5566", 2, 100, true);
         let walk = Walk::new(&recording).unwrap();
         let stage = Stage::new(&walk, 480).unwrap();
-        let extent = walk.extent(0..walk.len());
-        assert!((0..walk.len()).all(|f| stage.window(f) == stage.window(0)));
+        let extent = walk.extent(0..walk.frames());
+        assert!((0..walk.frames()).all(|f| stage.window(f) == stage.window(0)));
         let window = stage.window(0);
         assert!(window.left < extent.left && extent.right < window.right && extent.top < window.top);
         assert!((stage.to_pixels(0, [window.left, 0.0])[0]).abs() < 1e-6);
@@ -197,7 +197,7 @@ mod tests {
         }
         let walk = Walk::new(&recording).unwrap();
         let stage = Stage::new(&walk, 480).unwrap();
-        for f in 0..walk.len() {
+        for f in 0..walk.frames() {
             let x = stage.to_pixels(f, walk.centre(f))[0];
             assert!((100.0..380.0).contains(&x), "frame {f}: {x}");
         }

@@ -64,7 +64,7 @@ impl<'a> Walk<'a> {
     }
 
     /// Returns the number of frames, at least 1.
-    pub fn len(&self) -> usize {
+    pub fn frames(&self) -> usize {
         self.recording.frames.len()
     }
 
@@ -80,7 +80,7 @@ impl<'a> Walk<'a> {
 
     /// Returns the frames of a phase.
     pub(crate) fn phase_frames(&self, phase: usize) -> Range<usize> {
-        let first = |p: usize| self.recording.phases.get(p).map_or(self.len(), |p| p.first_frame);
+        let first = |p: usize| self.recording.phases.get(p).map_or(self.frames(), |p| p.first_frame);
         first(phase)..first(phase + 1)
     }
 

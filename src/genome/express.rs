@@ -42,7 +42,9 @@ impl Cppn {
         let mut values = Vec::from(inputs);
         values.resize(self.node_count(), Vec::new());
         for node in self.topological_order() {
-            let Some(function) = self.function(node) else { continue };
+            let Some(function) = self.function(node) else {
+                continue;
+            };
             let mut sums = vec![0.0; cells];
             // Values are finite, so an edge of weight 0 (all are at first) adds nothing.
             for edge in self.incoming(node).iter().filter(|e| e.weight != 0.0) {

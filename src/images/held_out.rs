@@ -118,7 +118,9 @@ pub(crate) fn images_besides(
     how_many: HowMany,
 ) -> Result<Vec<ImageRef>, Error> {
     let first = runs.iter().map(|run| &run.config).min_by_key(|config| config.seed);
-    let Some(config) = first else { return Ok(Vec::new()) };
+    let Some(config) = first else {
+        return Ok(Vec::new());
+    };
     let mut seen = besides.clone();
     for run in runs {
         seen.extend(trained_on(run, dataset)?);
@@ -128,7 +130,9 @@ pub(crate) fn images_besides(
         0 => error.advice("every image of that class was trained on; show test images"),
         most => error.advice(format!("ask for at most {most}")),
     })?;
-    let HowMany::Evenly(count) = how_many else { return Ok(left.concat()) };
+    let HowMany::Evenly(count) = how_many else {
+        return Ok(left.concat());
+    };
     let draw = |(&label, free): (&u8, Vec<ImageRef>)| -> Vec<ImageRef> {
         let mut random = stream(config.seed, Purpose::Validation, 0, u64::from(label));
         random.sample(free.len(), per_class).into_iter().map(|i| free[i]).collect()

@@ -174,7 +174,9 @@ impl Whereabouts {
 pub(crate) fn remember(folder: &RunFolder, dataset: &Dataset) -> Result<(), Error> {
     let path = folder.path().join(DATA_FOLDER);
     let failed = |error: &std::io::Error| Error::writing(&path, error);
-    let Some(source) = dataset.folder() else { return Ok(()) };
+    let Some(source) = dataset.folder() else {
+        return Ok(());
+    };
     let absolute = std::path::absolute(source).map_err(|error| failed(&error))?;
     // JSON cannot hold a path that is not Unicode: the user names it with --data again.
     if absolute.to_str().is_none() {

@@ -98,7 +98,9 @@ impl<S> Archive<S> {
         ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
         let mut kept: BTreeMap<K, usize> = BTreeMap::new();
         for (_, cell) in ranked {
-            let Some(elite) = self.elites.get(&cell) else { continue };
+            let Some(elite) = self.elites.get(&cell) else {
+                continue;
+            };
             let kept = kept.entry(kind(&elite.solution)).or_default();
             *kept += 1;
             if *kept > count {

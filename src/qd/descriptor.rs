@@ -83,7 +83,9 @@ pub(crate) fn possible_cells(area: usize, min_muscles: usize, tasks: usize) -> V
     };
     (0..space.len())
         .filter(|&index| {
-            let Some(bins) = space.coordinates(index) else { return false };
+            let Some(bins) = space.coordinates(index) else {
+                return false;
+            };
             let muscle = range(bins[0], min_muscles);
             let (sensor, total) = (range(bins[1], 0), range(bins[2], 1));
             matches!((muscle, sensor, total), (Some(m), Some(s), Some(t)) if m.0 + s.0 <= t.1)

@@ -76,7 +76,9 @@ pub(crate) fn teachable(
     seed: u64,
     session: &Session,
 ) -> Result<Option<Trainability>, Stopped> {
-    let Some(halves) = Half::both(shown, examples) else { return Ok(None) };
+    let Some(halves) = Half::both(shown, examples) else {
+        return Ok(None);
+    };
     let mut estimates = Vec::new();
     for (number, (own, other)) in (0..).zip([(&halves[0], &halves[1]), (&halves[1], &halves[0])]) {
         session.check()?;

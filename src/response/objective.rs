@@ -25,7 +25,9 @@ const WORTH_GOING_ON: f64 = 0.5;
 /// are bright, dark or at rest at random, independently of each other, and its opposite. Pixels
 /// that are the same in all training images keep their values: a constant carries no information.
 fn opposites(stimuli: &[Grid<f64>], physics: &Physics, seed: u64) -> Vec<Grid<f64>> {
-    let Some(first) = stimuli.first() else { return Vec::new() };
+    let Some(first) = stimuli.first() else {
+        return Vec::new();
+    };
     let changes = Grid::from_fn(first.height(), first.width(), |row, column| {
         stimuli.iter().any(|other| other[(row, column)] != first[(row, column)])
     });

@@ -240,7 +240,9 @@ impl Response {
                 let slopes = evidence(&others).slopes_alone(ridge);
                 let own = rollouts.iter().enumerate().filter(|(n, _)| (n / conditions) % FOLDS == number);
                 for (_, shown) in own {
-                    let Some(intercept) = others[shown.condition].intercept(&slopes) else { continue };
+                    let Some(intercept) = others[shown.condition].intercept(&slopes) else {
+                        continue;
+                    };
                     sum += squared(shown.displacement - intercept - dot(&slopes, &shown.widths));
                 }
             }

@@ -54,7 +54,9 @@ pub struct Published {
 impl Published {
     /// Returns the classes that its two directions stand for.
     pub(crate) fn judge(&self) -> Readout {
-        let says = |way| if way == self.zero_walks { vec![0] } else { vec![1] };
+        let says = |way| {
+            if way == self.zero_walks { vec![0] } else { vec![1] }
+        };
         Readout { left: says(Direction::Left), right: says(Direction::Right) }
     }
 }
@@ -103,7 +105,9 @@ pub fn config() -> Result<Config, Error> {
 /// # Errors
 /// As [`gallery()`]; also if only some of the names are published.
 pub(crate) fn is_meant(selection: &Selection) -> Result<bool, Error> {
-    let Selection::Ids(ids) = selection else { return Ok(false) };
+    let Selection::Ids(ids) = selection else {
+        return Ok(false);
+    };
     if matches!(ids.as_slice(), [word] if word == ALL) {
         return Ok(true);
     }

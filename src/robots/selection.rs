@@ -96,7 +96,9 @@ impl Selection {
         match self {
             Selection::All => "all elites".to_string(),
             Selection::Top(1) => "the fittest of each task on the training images".to_string(),
-            Selection::Top(count) => format!("the {count} fittest of each task on the training images"),
+            Selection::Top(count) => {
+                format!("the {count} fittest of each task on the training images")
+            }
             Selection::Random(count) => {
                 format!("{} of each task, drawn at random", counted(*count, "elite", "elites"))
             }

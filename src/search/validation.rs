@@ -211,7 +211,9 @@ pub(crate) fn best<'a>(
 /// Returns true if all robots of a run are validated with the settings of its config.
 fn is_own(run: &RunFile, robots: &[&Robot], wanted: &Wanted, control_steps: u32) -> bool {
     let ValidationConfig { images, best } = run.config.validation;
-    let Ok(grouping) = run.config.grouping() else { return false };
+    let Ok(grouping) = run.config.grouping() else {
+        return false;
+    };
     let all = run.elites.iter().filter(|robot| held_out_run::task_of(&grouping, robot).is_some()).count();
     let usual = (images, answer::THRESHOLD, held_out_run::control_steps(&run.config, held_out_run::CYCLES));
     (wanted.images, wanted.threshold, control_steps) == usual
@@ -280,7 +282,9 @@ fn screened(
             left.truncate(keep);
             scores = Vec::with_capacity(left.len());
             for (robot, mut displacements) in left {
-                let Some(split) = split_of(robot) else { continue };
+                let Some(split) = split_of(robot) else {
+                    continue;
+                };
                 let Some((others, _)) = walker.rollouts(robot, &stimuli[displacements.len()..shown]) else {
                     return Ok(None);
                 };

@@ -172,7 +172,9 @@ pub(crate) fn read(stream: &mut TcpStream) -> Result<Option<Request>, HttpRespon
             Ok(_) => {}
             // Browsers open connections that they then do not use.
             Err(_) if bytes.is_empty() => return Ok(None),
-            Err(_) => return Err(HttpResponse::refusal(408, "the request did not come in time")),
+            Err(_) => {
+                return Err(HttpResponse::refusal(408, "the request did not come in time"));
+            }
         }
     };
     let length = length(&request)?;
@@ -180,7 +182,9 @@ pub(crate) fn read(stream: &mut TcpStream) -> Result<Option<Request>, HttpRespon
         match more(stream, &mut bytes, deadline) {
             Ok(0) => return Err(HttpResponse::refusal(400, "the request ends in its body")),
             Ok(_) => {}
-            Err(_) => return Err(HttpResponse::refusal(408, "the request did not come in time")),
+            Err(_) => {
+                return Err(HttpResponse::refusal(408, "the request did not come in time"));
+            }
         }
     }
     request.body = bytes[begin..begin + length].to_vec();
@@ -209,7 +213,9 @@ fn parse(bytes: &[u8]) -> Result<Option<(Request, usize)>, HttpResponse> {
         Err(httparse::Error::TooManyHeaders) => {
             return Err(HttpResponse::refusal(431, &format!("expected at most {MAX_HEADERS} headers")));
         }
-        Err(error) => return Err(HttpResponse::refusal(400, &format!("not an HTTP request: {error}"))),
+        Err(error) => {
+            return Err(HttpResponse::refusal(400, &format!("not an HTTP request: {error}")));
+        }
     };
     let target = head.path.expect("a head that is whole has a path");
     let (path, query) = target.split_once('?').unwrap_or((target, ""));

@@ -120,7 +120,9 @@ fn connection(service: &Service, stream: &mut TcpStream) {
             Reply::Simulation(plan) => {
                 let lives =
                     |slot: &Slot, tell: &mut Tell| live(slot, &plan, |event| tell(&stream::text(&event)));
-                let Some(refusal) = simulation(service, &plan.who, lives, stream) else { return };
+                let Some(refusal) = simulation(service, &plan.who, lives, stream) else {
+                    return;
+                };
                 (refusal, false)
             }
             Reply::Team(plan) => {
@@ -128,7 +130,9 @@ fn connection(service: &Service, stream: &mut TcpStream) {
                     team::live(slot, &plan, &service.pool, |event| tell(&stream::of_team(&event)))
                 };
                 // A team takes one slot.
-                let Some(refusal) = simulation(service, &plan.members[0].1, lives, stream) else { return };
+                let Some(refusal) = simulation(service, &plan.members[0].1, lives, stream) else {
+                    return;
+                };
                 (refusal, false)
             }
         },

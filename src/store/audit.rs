@@ -229,7 +229,9 @@ impl AuditFile {
 
     /// Adds verdicts on other robots from a file about the same run, criteria and version.
     pub(crate) fn add_known(&mut self, path: &Path) {
-        let Ok(known) = AuditFile::read(path) else { return };
+        let Ok(known) = AuditFile::read(path) else {
+            return;
+        };
         let head = |file: &AuditFile| AuditFile { robots: Vec::new(), ..file.clone() };
         if head(&known) == head(self) {
             let others = known.robots.into_iter().filter(|robot| self.robot(&robot.id).is_none());

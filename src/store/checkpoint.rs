@@ -133,7 +133,9 @@ pub(crate) fn take_back(folder: &Path) -> Result<(), Error> {
 }
 
 fn read_one(path: &Path) -> Result<Option<Checkpoint>, Error> {
-    let Some(content) = content(path)? else { return Ok(None) };
+    let Some(content) = content(path)? else {
+        return Ok(None);
+    };
     let name = path.display().to_string();
     // The checksum covers the second line, which holds the text.
     let checkpoint: Checkpoint = reading::read_json(&content, &name)?;

@@ -357,7 +357,9 @@ pub fn beside(archive: &Path, name: &str) -> PathBuf {
 /// Returns the default path of joint results of several runs: in their common folder. With shipped
 /// runs it is in the current folder, with the name of their set if they share one.
 pub(crate) fn beside_all(archives: &[PathBuf], name: &str) -> PathBuf {
-    let [first, others @ ..] = archives else { return PathBuf::from(name) };
+    let [first, others @ ..] = archives else {
+        return PathBuf::from(name);
+    };
     if others.is_empty() {
         return beside(first, name);
     }
@@ -374,7 +376,9 @@ pub(crate) fn beside_all(archives: &[PathBuf], name: &str) -> PathBuf {
 /// Returns the folder of a run.json, or the nearest folder that contains several.
 fn above(archives: &[PathBuf]) -> PathBuf {
     let folders: Vec<&Path> = archives.iter().map(|path| path.parent().unwrap_or(Path::new(""))).collect();
-    let Some(first) = folders.first() else { return PathBuf::new() };
+    let Some(first) = folders.first() else {
+        return PathBuf::new();
+    };
     let holds = |folder: &&Path| folders.iter().all(|other| other.starts_with(folder));
     first.ancestors().find(holds).unwrap_or(Path::new("")).to_path_buf()
 }

@@ -292,7 +292,9 @@ pub(crate) fn states(paths: &[PathBuf]) -> Vec<LockState> {
         let is_over = began.elapsed() > BEAT + 2 * LOOK;
         std::thread::sleep(if is_over { Duration::ZERO } else { LOOK });
         for (path, state) in paths.iter().zip(&mut all) {
-            let LockState::Silent(before) = state else { continue };
+            let LockState::Silent(before) = state else {
+                continue;
+            };
             match read(path) {
                 Ok(None) => *state = LockState::Free,
                 Ok(Some(now)) if now != *before => *state = LockState::Held(Some(now)),
@@ -326,7 +328,9 @@ pub(crate) fn state(path: &Path) -> io::Result<LockState> {
     if is_locked == Some(true) {
         return Ok(LockState::Held(holder));
     }
-    let Some(holder) = holder else { return Ok(LockState::Free) };
+    let Some(holder) = holder else {
+        return Ok(LockState::Free);
+    };
     let is_here = holder.host == gethostname().to_string_lossy();
     let beaten = file.metadata()?.modified()?;
     // If the other machine's clock is ahead, no time has passed.

@@ -166,7 +166,9 @@ pub(crate) fn moments(archive: &Path) -> Result<Vec<Moment>, Error> {
 /// Returns the errors of [`moments`], or an error if the file is of another run or state.
 pub(crate) fn moments_of(run: &RunFile, archive: &Path) -> Result<Vec<Moment>, Error> {
     let moments = moments(archive)?;
-    let Some(last) = run.generations.checked_sub(1) else { return Ok(moments) };
+    let Some(last) = run.generations.checked_sub(1) else {
+        return Ok(moments);
+    };
     let ArchiveStats { coverage, qd_score, obj_max, .. } = run.stats;
     let is_it = |moment: &&Moment| {
         (moment.coverage, moment.qd_score, moment.obj_max) == (coverage, qd_score, obj_max)

@@ -151,7 +151,9 @@ pub(crate) fn answer(readout: Option<&Readout>, moved: f64) -> Reading {
         (Some(readout), Some(Direction::Right)) => readout.right.clone(),
         _ => Vec::new(),
     };
-    let name = |way| if way == Direction::Left { "left" } else { "right" };
+    let name = |way| {
+        if way == Direction::Left { "left" } else { "right" }
+    };
     Reading { moved, way: way.map(name), says }
 }
 
@@ -159,7 +161,9 @@ pub(crate) fn answer(readout: Option<&Readout>, moved: f64) -> Reading {
 /// `over`, the walk has ended: "says 0: correct" or "says 0: wrong" if the image's `class` is one
 /// of the task's, and "undecided" if it names no class. Empty without a judge.
 pub(crate) fn verdict(readout: Option<&Readout>, moved: f64, class: u8, over: bool) -> String {
-    let Some(readout) = readout else { return String::new() };
+    let Some(readout) = readout else {
+        return String::new();
+    };
     let says = answer(Some(readout), moved).says;
     let classes = says.iter().map(u8::to_string).collect::<Vec<_>>().join(" or ");
     let is_known = readout.left.contains(&class) || readout.right.contains(&class);

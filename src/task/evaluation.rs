@@ -165,7 +165,9 @@ pub(crate) fn fresh_rollouts_so_far(
     let worker = |_| {
         let mut own = Vec::new();
         while let Some((number, images)) = parts.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let Ok(rolled) = setup.side_by_side(body, &systems[*number], images) else { break };
+            let Ok(rolled) = setup.side_by_side(body, &systems[*number], images) else {
+                break;
+            };
             images.iter().for_each(|image| progress(shared[image]));
             own.extend(images.iter().copied().zip(rolled));
         }
@@ -470,7 +472,9 @@ impl<'a> Candidate<'a> {
             return;
         }
         while !is_over(rollouts) {
-            let Some(rollout) = rollouts.ended[rollouts.counted].take() else { return };
+            let Some(rollout) = rollouts.ended[rollouts.counted].take() else {
+                return;
+            };
             rollouts.counted += 1;
             for displacement in rollout.displacements {
                 rollouts.displacements.push(displacement);

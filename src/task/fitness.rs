@@ -129,7 +129,9 @@ pub(crate) fn response_so_far(displacements: impl Iterator<Item = Option<f64>>) 
     for turn in 0..conditions {
         let within = || even.iter().skip(turn).step_by(conditions);
         // Relative to the first: if all are the same, rounding of their mean makes no difference.
-        let Some(first) = within().next() else { continue };
+        let Some(first) = within().next() else {
+            continue;
+        };
         let count = within().count();
         let mean = within().map(|even| even - first).sum::<f64>() / count as f64;
         squares += within().map(|even| (even - first - mean) * (even - first - mean)).sum::<f64>();
@@ -165,7 +167,9 @@ pub(super) fn weights(margins: impl Iterator<Item = (usize, Option<f64>)>) -> ([
     let mut images = [0; 2];
     margins.for_each(|(group, _)| images[group] += 1);
     let all = images[0] + images[1];
-    let weight = |of_group: usize| if images.contains(&0) { 1.0 } else { all as f64 / (2 * of_group) as f64 };
+    let weight = |of_group: usize| {
+        if images.contains(&0) { 1.0 } else { all as f64 / (2 * of_group) as f64 }
+    };
     (images, images.map(weight))
 }
 

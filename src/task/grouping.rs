@@ -94,7 +94,9 @@ impl Groups {
             number.filter(|_| self.are_digits && group.len() > 1)
         };
         let numbers = self.classes.each_ref().map(number);
-        let Some(class) = numbers.into_iter().flatten().next() else { return Ok(()) };
+        let Some(class) = numbers.into_iter().flatten().next() else {
+            return Ok(());
+        };
         let [a, b] = &self.classes;
         let lone = |place: usize| numbers[place].map_or(self.classes[place].clone(), |number| vec![number]);
         Err(Ambiguous {

@@ -70,7 +70,9 @@ impl fmt::Display for Margins {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.written() {
             Written::Same(margin) => margin.fmt(f),
-            Written::Each([top, right, bottom, left]) => write!(f, "[{top}, {right}, {bottom}, {left}]"),
+            Written::Each([top, right, bottom, left]) => {
+                write!(f, "[{top}, {right}, {bottom}, {left}]")
+            }
         }
     }
 }

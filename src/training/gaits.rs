@@ -70,7 +70,9 @@ pub(crate) fn walkers<'a>(
         chosen.sort_by(|a, b| b.robot.objective.total_cmp(&a.robot.objective));
     }
     for chosen in chosen {
-        let Some(gait) = Gait::of(&chosen.robot.body) else { continue };
+        let Some(gait) = Gait::of(&chosen.robot.body) else {
+            continue;
+        };
         if walkers.iter().all(|other| other.gait.probe() != gait.probe()) {
             walkers.push(Walker { robot: chosen.robot, gait });
         }
@@ -104,7 +106,9 @@ pub(crate) fn measured(
     if (&config.physics, &config.protocol) != (&of_run.physics, &protocol) {
         return nothing();
     }
-    let Some(file) = ResponseFile::found(&path, session) else { return nothing() };
+    let Some(file) = ResponseFile::found(&path, session) else {
+        return nothing();
+    };
     let (run, seed, conditions) = (source.run.fingerprint(), of_run.seed, probing.conditions());
     walkers.iter().map(|walker| file.known(&run, seed, conditions, &walker.gait).0.to_vec()).collect()
 }

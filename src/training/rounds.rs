@@ -251,7 +251,9 @@ impl<'a> GaitTrainer<'a> {
         for ((number, design), displacement) in asked.iter().zip(&found) {
             let Image { example, condition, .. } = &self.images[*number];
             let widths = example.widths(design);
-            let Some(displacement) = displacement else { continue };
+            let Some(displacement) = displacement else {
+                continue;
+            };
             off += displacement - self.intercepts[*condition] - dot(&self.slopes, &widths);
             stable += 1.0;
             sets[*condition].add(&widths, *displacement);

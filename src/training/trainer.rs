@@ -120,7 +120,9 @@ impl Trainer<'_> {
         for (walker, measured) in walkers.iter().zip(&self.measured) {
             let (gait, robot) = (&walker.gait, &walker.robot.id);
             log.begins(format!("{robot}: response:"), self.config.train.random_images);
-            let Some(response) = self.response(gait, measured, log)? else { continue };
+            let Some(response) = self.response(gait, measured, log)? else {
+                continue;
+            };
             report_response(session, &walker.robot.id, gait, &response);
             let seeing = self.with_window(walker, &response, log, session)?;
             let images = self.images(gait, &seeing)?;

@@ -54,7 +54,9 @@ fn a_whole_set_is_read_as_the_mnist_crate_reads_it() {
 
 #[test]
 fn the_real_test_set_has_its_published_class_counts() {
-    let Some(folder) = mnist("class counts of the real one") else { return };
+    let Some(folder) = mnist("class counts of the real one") else {
+        return;
+    };
     let given = places(None, Some(folder), None);
     let data = Dataset::load("mnist", &given, &[Split::Test]).unwrap();
     let counts: Vec<usize> = (0..10).map(|class| data.indices_of(Split::Test, class).len()).collect();
@@ -64,7 +66,9 @@ fn the_real_test_set_has_its_published_class_counts() {
 
 #[test]
 fn the_papers_training_images_are_a_zero_a_one_a_two_and_a_three() {
-    let Some(folder) = mnist("the paper's training images") else { return };
+    let Some(folder) = mnist("the paper's training images") else {
+        return;
+    };
     let given = places(None, Some(folder), None);
     let data = Dataset::load("mnist", &given, &[Split::Train]).unwrap();
     let labels = [1, 3, 5, 7].map(|index| data.label(Split::Train, index).unwrap());

@@ -122,7 +122,9 @@ fn the_built_in_gallery_holds_these_very_robots() {
 
 #[test]
 fn the_published_robots_answer_test_images() {
-    let Some(data) = mnist("published robots") else { return };
+    let Some(data) = mnist("published robots") else {
+        return;
+    };
     let sandbox = Sandbox::new();
     let data = std::fs::canonicalize(data).unwrap();
     let args = ["eval", "-q", "--robots", "qmaxd,YJTLA", "--images", "40", "--data"];

@@ -96,7 +96,9 @@ fn they_walk_to_the_bit_as_in_their_test() {
 
 #[test]
 fn the_baselines_beside_them_are_those_that_eval_finds_today() {
-    let Some(data) = program::mnist("the baselines of trained robots") else { return };
+    let Some(data) = program::mnist("the baselines of trained robots") else {
+        return;
+    };
     // One of them: the rule is the same for all.
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/four_digit/2v013");
     let sandbox = Sandbox::new();

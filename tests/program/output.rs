@@ -227,7 +227,9 @@ fn every_event_of_json_is_documented_with_its_fields() {
             open.extend(std::fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()));
             continue;
         }
-        let Ok(source) = std::fs::read_to_string(&path) else { continue };
+        let Ok(source) = std::fs::read_to_string(&path) else {
+            continue;
+        };
         let code = source.split("#[cfg(test)]").next().unwrap();
         for call in [".event(", ".finding("] {
             let names = code.split(call).skip(1).filter_map(|rest| rest.trim_start().strip_prefix('"'));

@@ -72,7 +72,9 @@ fn robots_are_selected_in_the_same_words_by_every_command() {
     }
     // A figure each.
     sandbox.run("plot body -a a --robots all").ended(0, &[]);
-    assert!(run.elites.iter().all(|robot| sandbox.path(&format!("a/plot-body-{}.svg", robot.id)).exists()));
+    assert!(
+        run.elites.iter().all(|robot| { sandbox.path(&format!("a/plot-body-{}.svg", robot.id)).exists() })
+    );
     sandbox.run("plot body --robots gallery").ended(0, &[]);
     assert!(["APUKI", "YJTLA"].iter().all(|name| sandbox.path(&format!("plot-body-{name}.svg")).exists()));
     // Of several archives together.

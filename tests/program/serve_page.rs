@@ -91,7 +91,9 @@ fn answer(tab: &mut Tab, line: &[[f64; 2]]) -> (String, String) {
 #[test]
 fn a_drawn_zero_and_a_drawn_one_are_told_apart_and_the_page_fits_everywhere() {
     let sandbox = Sandbox::new();
-    let Some(mut browser) = browser(&sandbox) else { return };
+    let Some(mut browser) = browser(&sandbox) else {
+        return;
+    };
     let server = Server::start(&sandbox, "");
 
     let mut tab = browser.tab(1280, 900, false);
@@ -197,7 +199,9 @@ fn by_hand(digit: u8, dice: &mut Dice) -> Vec<[f64; 2]> {
 #[test]
 fn digits_drawn_in_any_size_place_and_slant_are_read_by_the_robot_that_the_page_begins_with() {
     let sandbox = Sandbox::new();
-    let Some(mut browser) = browser(&sandbox) else { return };
+    let Some(mut browser) = browser(&sandbox) else {
+        return;
+    };
     let server = Server::start(&sandbox, "");
     let mut tab = quick(&mut browser, &server);
     let mut wrong = Vec::new();
@@ -216,7 +220,9 @@ fn digits_drawn_in_any_size_place_and_slant_are_read_by_the_robot_that_the_page_
 #[test]
 fn strokes_go_on_are_fitted_and_erased_as_the_hand_meant_them() {
     let sandbox = Sandbox::new();
-    let Some(mut browser) = browser(&sandbox) else { return };
+    let Some(mut browser) = browser(&sandbox) else {
+        return;
+    };
     let server = Server::start(&sandbox, "");
     let mut tab = quick(&mut browser, &server);
     a_drawing_is_fitted_unless_that_is_turned_off(&mut tab);
@@ -289,7 +295,9 @@ fn what_was_erased_is_not_seen_at_any_size_of_the_drawing(tab: &mut Tab) {
 #[test]
 fn a_run_that_begins_while_the_page_is_open_appears_grows_and_ends_on_it() {
     let sandbox = Sandbox::new();
-    let Some(mut browser) = browser(&sandbox) else { return };
+    let Some(mut browser) = browser(&sandbox) else {
+        return;
+    };
     let server = Server::start(&sandbox, "");
     let mut tab = browser.tab(1280, 800, false);
     open(&mut tab, &server);
@@ -313,7 +321,9 @@ fn a_run_that_begins_while_the_page_is_open_appears_grows_and_ends_on_it() {
 #[test]
 fn below_the_prefix_of_a_proxy_and_by_a_name_that_is_allowed_all_of_the_page_works() {
     let sandbox = Sandbox::tiny();
-    let Some(mut browser) = browser(&sandbox) else { return };
+    let Some(mut browser) = browser(&sandbox) else {
+        return;
+    };
     // Two tasks are a team.
     let other = "--set task.groups=[[0],[2]] --set data.train_images= --set data.images_per_class=1";
     for (name, task) in [("one", ""), ("two", other)] {
@@ -353,7 +363,9 @@ fn below_the_prefix_of_a_proxy_and_by_a_name_that_is_allowed_all_of_the_page_wor
 #[test]
 fn an_audit_that_appears_while_the_page_is_open_is_said_and_can_be_chosen_by() {
     let sandbox = Sandbox::tiny();
-    let Some(mut browser) = browser(&sandbox) else { return };
+    let Some(mut browser) = browser(&sandbox) else {
+        return;
+    };
     sandbox.run("evolve -q -c tiny.toml -o run").ended(0, &[]);
     sandbox.run("audit -q -a run -o audit.json").ended(0, &[]);
     let audit: Value = serde_json::from_str(&sandbox.read("audit.json")).unwrap();
@@ -397,7 +409,9 @@ fn an_audit_that_appears_while_the_page_is_open_is_said_and_can_be_chosen_by() {
 #[test]
 fn a_body_that_is_built_and_its_robot_are_in_sight_together_and_the_simulation_ends_with_its_tab() {
     let sandbox = Sandbox::new();
-    let Some(mut browser) = browser(&sandbox) else { return };
+    let Some(mut browser) = browser(&sandbox) else {
+        return;
+    };
     let server = Server::start(&sandbox, "");
     let mut tab = browser.tab(1280, 800, false);
     open(&mut tab, &server);
@@ -444,7 +458,9 @@ fn a_body_that_is_built_and_its_robot_are_in_sight_together_and_the_simulation_e
 #[test]
 fn the_team_that_ships_reads_a_drawn_one() {
     let sandbox = Sandbox::new();
-    let Some(mut browser) = browser(&sandbox) else { return };
+    let Some(mut browser) = browser(&sandbox) else {
+        return;
+    };
     let server = Server::start(&sandbox, "");
     let mut tab = quick(&mut browser, &server);
     tab.click("#tab-team");
@@ -459,7 +475,9 @@ fn the_team_that_ships_reads_a_drawn_one() {
 #[test]
 fn a_team_walks_on_small_stages_and_its_votes_are_counted() {
     let sandbox = Sandbox::new();
-    let Some(mut browser) = browser(&sandbox) else { return };
+    let Some(mut browser) = browser(&sandbox) else {
+        return;
+    };
     // All three are called tiny, and have one seed.
     for (name, pair) in [("a", "0v1"), ("b", "0v2"), ("c", "1v2")] {
         let (mut run, _) = published::trained(&format!("{TEAM}-{pair}")).unwrap().remove(0);

@@ -489,7 +489,9 @@ fn made_by(config: &str, groups: &str) -> usize {
         let run = RunFile::read(&sandbox.path(folder).join("run.json"));
         run.unwrap_or_else(|error| panic!("{error}\n{groups}\n{config}"))
     };
-    let Ok(config) = Config::parse(config, "any.toml", &[]) else { return 0 };
+    let Ok(config) = Config::parse(config, "any.toml", &[]) else {
+        return 0;
+    };
     let if_exists = IfExists::Refuse;
     let options = evolve::EvolveOptions {
         config: config.clone(),

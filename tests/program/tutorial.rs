@@ -47,7 +47,9 @@ fn words(line: &str) -> Vec<String> {
 /// on few random images, a film of few frames.
 fn in_small(mut command: Vec<String>) -> Vec<String> {
     for (flag, parts) in [("--generations", 20), ("--images", 10)] {
-        let Some(at) = command.iter().position(|word| word == flag) else { continue };
+        let Some(at) = command.iter().position(|word| word == flag) else {
+            continue;
+        };
         let number: u32 = command[at + 1].parse().expect("the flag takes a number");
         command[at + 1] = number.div_ceil(parts).to_string();
     }

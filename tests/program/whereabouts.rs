@@ -240,7 +240,9 @@ fn robots_are_shown_another_dataset_if_it_is_asked_for_and_the_results_say_so() 
 
 #[test]
 fn mnist_is_known_by_any_name() {
-    let Some(mnist) = mnist("other names of MNIST") else { return };
+    let Some(mnist) = mnist("other names of MNIST") else {
+        return;
+    };
     let sandbox = Sandbox::new();
     let info = |name: &str, options: &[&str]| {
         let mut command = sandbox.command(["data", "info", name].iter().chain(options));

@@ -247,7 +247,9 @@ impl World {
 fn scenario(world: &World, dice: &mut Dice, case: &mut Case) {
     case.input = world.json("scenario", dice);
     let path = world.sandbox.write("scenario.json", &case.input);
-    let Some(scenario) = case.check(Scenario::read(&path), "scenario.json") else { return };
+    let Some(scenario) = case.check(Scenario::read(&path), "scenario.json") else {
+        return;
+    };
     // As many rows as a reader takes before it closes the pipe.
     let (mut rows, begin) = (0, Instant::now());
     let gone = || Error::unstable("scenario.json: nobody reads on".to_string());
@@ -263,7 +265,9 @@ fn run(world: &World, dice: &mut Dice, case: &mut Case) {
     case.input = world.json("run", dice);
     let folder = world.with("run.json", &case.input);
     let archive = folder.join("run.json");
-    let Some(run) = case.check(RunFile::read(&archive), "run.json") else { return };
+    let Some(run) = case.check(RunFile::read(&archive), "run.json") else {
+        return;
+    };
     let options = eval::EvalOptions {
         archives: vec![archive.clone()],
         robots: Selection::Top(1),

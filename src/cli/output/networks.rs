@@ -110,7 +110,9 @@ pub(crate) fn table(console: &Console, finished: &ReproduceOutcome) {
     }
     let number = |value: Option<f64>| value.map_or_else(unknown, |value| number::fixed(value, 1));
     let rows = finished.rows.iter().map(|row| {
-        let own = |value: Option<Crossing>| if row.robots == 0 { unknown() } else { size(value) };
+        let own = |value: Option<Crossing>| {
+            if row.robots == 0 { unknown() } else { size(value) }
+        };
         let paper = |value: Option<f64>| match row.paper_accuracy {
             None => unknown(),
             Some(_) => size(value.map(Crossing::At)),

@@ -157,7 +157,7 @@ pub(crate) fn make(
             Format::Png => {
                 let walk = Walk::new(recording).map_err(failed)?;
                 let stage = Stage::new(&walk, wanted.width).map_err(failed)?.look(wanted.look);
-                let picture = raster::picture(&walk, walk.len() - 1, &stage).map_err(failed)?;
+                let picture = raster::picture(&walk, walk.frames() - 1, &stage).map_err(failed)?;
                 raster::write_png(path, &picture).map_err(failed)?;
             }
             Format::Terminal => {

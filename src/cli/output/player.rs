@@ -77,14 +77,16 @@ pub(crate) fn play(console: &Console, walk: &Walk) -> Result<(), Error> {
     let Some(mut live) = console.live() else {
         let (columns, rows) = view(USUAL, false);
         match console.mode() {
-            Mode::Json => console.line(&terminal::frame(walk, walk.len() - 1, columns, rows, Depth::Plain)),
-            _ => console.text(&(terminal::frame(walk, walk.len() - 1, columns, rows, depth) + "\n")),
+            Mode::Json => {
+                console.line(&terminal::frame(walk, walk.frames() - 1, columns, rows, Depth::Plain))
+            }
+            _ => console.text(&(terminal::frame(walk, walk.frames() - 1, columns, rows, depth) + "\n")),
         }
         return Ok(());
     };
     let stop = signals::stop_flag()?;
     let screen = Screen::new(console);
-    let mut player = Player::new(walk.len());
+    let mut player = Player::new(walk.frames());
     let mut shown = None;
     let mut place = terminal_size();
     let mut then = Instant::now();

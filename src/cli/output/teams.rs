@@ -58,7 +58,9 @@ pub(crate) fn team(console: &Console, file: &TeamFile, out: Option<&Path>) -> Re
 }
 
 fn answers(console: &Console, file: &TeamFile) {
-    let Some((headers, rows)) = table(file) else { return };
+    let Some((headers, rows)) = table(file) else {
+        return;
+    };
     let headers: Vec<&str> = headers.iter().map(String::as_str).collect();
     console.table(&headers, &rows);
     console.line("");

@@ -137,7 +137,9 @@ pub(crate) fn run_all(
     let worker = || {
         while session.check().is_ok() {
             let index = next.fetch_add(1, Ordering::Relaxed);
-            let Some((number, task)) = numbered.get(index) else { break };
+            let Some((number, task)) = numbered.get(index) else {
+                break;
+            };
             let has_begun = AtomicBool::new(false);
             let part = Part { all: &all, index, amount: task.amount(), name: &task.name, has_begun };
             let ended =

@@ -86,7 +86,9 @@ pub(super) fn lacking(task: &Task, place: &TaskFolders) -> Option<String> {
 /// # Errors
 /// Returns an error if its selection of robots cannot be read.
 pub(crate) fn test_of(task: &Task, place: &TaskFolders) -> Result<Option<eval::EvalOptions>, Error> {
-    let Some(step) = &task.steps.eval else { return Ok(None) };
+    let Some(step) = &task.steps.eval else {
+        return Ok(None);
+    };
     let folder = place.folder(task);
     Ok(Some(eval::EvalOptions {
         archives: vec![folder.join(RUN_JSON)],
@@ -188,7 +190,9 @@ fn of_task(error: Error) -> Error {
         let error = Error { kind: ErrorKind::Input, remedies: Vec::new(), ..error };
         return error.remedy(Remedy::MoveAway).remedy(Remedy::ChooseOut);
     }
-    let by_itself = |remedy| if remedy == Remedy::RepeatResuming { Remedy::Repeat } else { remedy };
+    let by_itself = |remedy| {
+        if remedy == Remedy::RepeatResuming { Remedy::Repeat } else { remedy }
+    };
     Error { remedies: error.remedies.into_iter().map(by_itself).collect(), ..error }
 }
 

@@ -136,7 +136,9 @@ impl Steps {
             selection("audit.robots", &step.robots)?;
             step.criteria.check().map_err(|error| error.with_key("audit.criteria"))?;
         }
-        let Some(step) = &self.eval else { return Ok(()) };
+        let Some(step) = &self.eval else {
+            return Ok(());
+        };
         let tested = selection("eval.robots", &step.robots)?;
         let Some(audit) = self.audit.as_ref().filter(|_| step.physical_only) else {
             return match step.physical_only {
@@ -234,7 +236,9 @@ impl Task {
 
     /// Returns the folder of the atlas that its gaits are from, if any.
     pub(crate) fn atlas(&self) -> Option<PathBuf> {
-        let Run::Train(training) = &self.run else { return None };
+        let Run::Train(training) = &self.run else {
+            return None;
+        };
         shipped::atlas_of(&training.archive)
     }
 

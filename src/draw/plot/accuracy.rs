@@ -63,7 +63,9 @@ pub(crate) fn accuracy(report: &EvalFile) -> Figure {
 
 /// Names the runs: name and seeds, or their number if they have several names.
 fn runs(report: &EvalFile) -> String {
-    let Some(seeds) = seeds(report) else { return format!("{} runs", report.runs.len()) };
+    let Some(seeds) = seeds(report) else {
+        return format!("{} runs", report.runs.len());
+    };
     let word = if seeds.len() > 1 { "seeds" } else { "seed" };
     let seeds: Vec<String> = seeds.iter().map(u64::to_string).collect();
     format!("{}, {word} {}", report.run, seeds.join(", "))

@@ -129,7 +129,9 @@ fn map(
             let left = x + muscle as f64 * step + gap / 2.0;
             let top = y + side - (sensor + 1) as f64 * step + gap / 2.0;
             for total in 0..COUNT_BINS {
-                let Some(elite) = cell([muscle, sensor, total]) else { continue };
+                let Some(elite) = cell([muscle, sensor, total]) else {
+                    continue;
+                };
                 let (at, size) = ([left + total as f64 * strip, top], [strip, step - gap]);
                 frames.push(Piece::Rectangle { at, size });
                 if let Some(fitness) = elite {

@@ -41,7 +41,9 @@ impl Axis {
     }
 
     fn stepped(low: f64, high: f64, about: usize) -> Self {
-        let finite = |v: f64, other: f64| if v.is_finite() { v.clamp(-1e12, 1e12) } else { other };
+        let finite = |v: f64, other: f64| {
+            if v.is_finite() { v.clamp(-1e12, 1e12) } else { other }
+        };
         let (low, high) = (finite(low, 0.0), finite(high, 1.0));
         let (low, high) = if high - low > 1e-9 { (low, high) } else { (low - 0.5, low + 0.5) };
         let rough = (high - low) / about.max(1) as f64;

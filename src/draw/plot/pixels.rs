@@ -113,7 +113,9 @@ fn layer(pixmap: &mut Pixmap, area: Option<Rect>, content: &Canvas, opacity: f32
     let edge = |v: f32, most: u32| v.clamp(0.0, most as f32);
     let [left, right] = [area.left().floor(), area.right().ceil()].map(|x| edge(x, pixmap.width()));
     let [top, bottom] = [area.top().floor(), area.bottom().ceil()].map(|y| edge(y, pixmap.height()));
-    let Some(mut layer) = Pixmap::new((right - left) as u32, (bottom - top) as u32) else { return };
+    let Some(mut layer) = Pixmap::new((right - left) as u32, (bottom - top) as u32) else {
+        return;
+    };
     content.draw(&mut layer, to_pixels.post_translate(-left, -top));
     let back = Transform::from_translate(left, top);
     let shader = Pattern::new(layer.as_ref(), SpreadMode::Pad, FilterQuality::Nearest, opacity, back);

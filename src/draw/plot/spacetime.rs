@@ -35,7 +35,7 @@ const HEIGHTS: [f64; 2] = [90.0, 210.0];
 pub(crate) fn spacetime(recording: &Recording, of: &str) -> Result<Figure, PictureError> {
     let walk = Walk::new(recording)?;
     let mut rollouts = Vec::<Range<usize>>::new();
-    while rollouts.last().map_or(0, |rollout| rollout.end) < walk.len() {
+    while rollouts.last().map_or(0, |rollout| rollout.end) < walk.frames() {
         let rollout = walk.rollout(rollouts.last().map_or(0, |rollout| rollout.end));
         rollouts.push(rollout.start..rollout.end.max(rollout.start + 1));
     }

@@ -12,7 +12,9 @@ const LITERATURE: &str = "mechanics elsewhere: an oscillating plate with trained
 /// Returns headers and rows of the team's answers and of baselines without bodies on the same
 /// images, or `None` without answers.
 pub(crate) fn table(file: &TeamFile) -> Option<(Vec<String>, Vec<Vec<String>>)> {
-    let (Some(answers), Some(baselines)) = (&file.answers, &file.baselines) else { return None };
+    let (Some(answers), Some(baselines)) = (&file.answers, &file.baselines) else {
+        return None;
+    };
     let row = |name: &str, accuracy: &Accuracy| {
         let [accuracy, interval] = figures(accuracy);
         vec![name.to_string(), accuracy, interval]
@@ -34,7 +36,9 @@ pub(crate) fn table(file: &TeamFile) -> Option<(Vec<String>, Vec<Vec<String>>)> 
 
 /// Returns remarks on these answers, in lines.
 pub(crate) fn remarks(file: &TeamFile) -> Vec<String> {
-    let (Some(answers), Some(baselines)) = (&file.answers, &file.baselines) else { return Vec::new() };
+    let (Some(answers), Some(baselines)) = (&file.answers, &file.baselines) else {
+        return Vec::new();
+    };
     let (images, robots) = (file.images.len(), file.members.len());
     let mut lines = vec![
         format!("{images} {} {} images, {robots} robots, no trained weights", file.dataset, file.split),

@@ -58,7 +58,9 @@ pub(super) fn section(
         out += &watched(team, runs, simulated)?;
     }
     let figures = [plot::confusion(file), plot::poster(file)].into_iter().flatten();
-    let class = |figure: &Figure| if figure.size()[0] > COLUMN + 1.0 { "page" } else { "column" };
+    let class = |figure: &Figure| {
+        if figure.size()[0] > COLUMN + 1.0 { "page" } else { "column" }
+    };
     let figures: String = figures.map(|found| figure(&found, class(&found))).collect();
     out += &format!("<div class=\"figures\">\n{figures}</div>\n");
     Ok(out + "</section>\n")
@@ -202,7 +204,9 @@ fn positions(frames: &[&Frame]) -> Vec<u8> {
     let steps = |frame: &Frame| -> Vec<i32> {
         frame.points.iter().flatten().map(|v| (v * STEPS).round() as i32).collect()
     };
-    let Some((first, others)) = frames.split_first() else { return Vec::new() };
+    let Some((first, others)) = frames.split_first() else {
+        return Vec::new();
+    };
     let mut at: Vec<i32> =
         steps(first).into_iter().map(|v| v.clamp(i32::from(i16::MIN), i32::from(i16::MAX))).collect();
     let mut bytes: Vec<u8> = at.iter().flat_map(|v| (*v as i16).to_le_bytes()).collect();

@@ -137,7 +137,9 @@ pub(super) fn methods(dossier: &Dossier) -> String {
     };
     let margin = match config.stimulus.margin {
         none if none.is_none() => String::new(),
-        margin if margin == Margins::same(margin.top) => format!(" (without a margin of {margin} pixels)"),
+        margin if margin == Margins::same(margin.top) => {
+            format!(" (without a margin of {margin} pixels)")
+        }
         Margins { top, right, bottom, left } => format!(
             " (without its {top} rows of pixels at the top, {bottom} at the bottom, {left} columns on the left and {right} on the right)"
         ),

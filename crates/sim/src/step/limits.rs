@@ -236,7 +236,9 @@ impl SharedRigidPass {
             std::array::from_fn(|_| positions.next())
         };
         for (lane, position) in positions.iter().enumerate() {
-            let Some([from_x, from_y]) = position else { continue };
+            let Some([from_x, from_y]) = position else {
+                continue;
+            };
             for (&point, (x, y)) in points.iter().zip(x.iter_mut().zip(y.iter_mut())) {
                 (x[lane], y[lane]) = (from_x[point], from_y[point]);
             }
@@ -266,7 +268,9 @@ impl SharedRigidPass {
             }
         }
         for (lane, position) in positions.iter_mut().enumerate() {
-            let Some([to_x, to_y]) = position else { continue };
+            let Some([to_x, to_y]) = position else {
+                continue;
+            };
             for (&point, (x, y)) in points.iter().zip(x.iter().zip(y.iter())) {
                 (to_x[point], to_y[point]) = (x[lane], y[lane]);
             }

@@ -75,7 +75,9 @@ fn off_lattice_stage<L: Lanes>(lattice: &Lattice, scratch: &mut Scratch, stage: 
 #[inline(always)]
 fn load_of<L: Lanes>(work: &Work, off_lattice: Option<&OffLattice>, slot: usize) -> [L; 2] {
     let of = each!(axis in [X, Y] => L::load(&work.load[axis], slot % BLOCK));
-    let Some(off_lattice) = off_lattice else { return of };
+    let Some(off_lattice) = off_lattice else {
+        return of;
+    };
     each!(axis in [X, Y] => of[axis] + L::load(&off_lattice.load[axis], slot))
 }
 
