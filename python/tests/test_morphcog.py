@@ -267,7 +267,7 @@ def test_errors_call_options_as_this_module_does(run, tmp_path):
         mc.evolve("quickstart.toml", set={"map_elites.parents": 0})
     with pytest.raises(mc.Error) as error:
         mc.images("mnist", data=tmp_path)
-    assert "(data)" in str(error.value) and "morphcog data fetch mnist --to" in str(error.value)
+    assert "as given" in str(error.value) and "morphcog data fetch mnist --to" in str(error.value)
 
 
 def test_evolve_says_how_far_it_is_unless_it_is_quiet(tmp_path, capsys, monkeypatch):
