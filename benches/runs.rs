@@ -37,7 +37,9 @@ fn config(overrides: &[&str]) -> Config {
 }
 
 fn stimulus(seed: usize) -> Grid<f64> {
-    Grid::from_fn(14, 14, |row, column| f64::from(u8::from((row * 3 + column * 5 + seed).is_multiple_of(7))))
+    Grid::from_fn(14, 14, |row, column| {
+        f64::from(u8::from((row * 3 + column * 5 + seed).is_multiple_of(7)))
+    })
 }
 
 fn rollouts(criterion: &mut Criterion<Processor>) {
@@ -61,8 +63,9 @@ fn side_by_side(criterion: &mut Criterion<Processor>) {
     group.sample_size(20);
     for specimen in bench::specimens() {
         let system = Arc::new(System::new(&specimen.body, config.physics.clone()));
-        let by_itself =
-            |stimulus: &Grid<f64>| fresh_rollout(&system, &config.protocol, stimulus, &NEVER).is_ok();
+        let by_itself = |stimulus: &Grid<f64>| {
+            fresh_rollout(&system, &config.protocol, stimulus, &NEVER).is_ok()
+        };
         group.bench_function(format!("{}, one by one", specimen.name), |bencher| {
             bencher.iter(|| stimuli.iter().map(by_itself).collect::<Vec<bool>>());
         });
@@ -81,23 +84,49 @@ fn evaluations(criterion: &mut Criterion) {
         .collect();
     let specimens = bench::specimens();
     let cases: [(&str, Vec<&Body>, usize); 3] = [
-        ("generation: 20 random robots, 2 images", bodies.iter().collect(), 2),
-        ("eval: the full robot, 100 images", vec![&specimens[0].body], 100),
-        ("eval: the mostly rigid robot, 100 images", vec![&specimens[3].body], 100),
+        (
+            "generation: 20 random robots, 2 images",
+            bodies.iter().collect(),
+            2,
+        ),
+        (
+            "eval: the full robot, 100 images",
+            vec![&specimens[0].body],
+            100,
+        ),
+        (
+            "eval: the mostly rigid robot, 100 images",
+            vec![&specimens[3].body],
+            100,
+        ),
     ];
-    let savings = Savings { known_bodies: false, early_stop: false, shared_rollouts: false };
-    let mut group = criterion
-        .benchmark_group(format!("rollouts of 50 control steps, {}", InstructionSet::in_use().name()));
+    let savings = Savings {
+        known_bodies: false,
+        early_stop: false,
+        shared_rollouts: false,
+    };
+    let mut group = criterion.benchmark_group(format!(
+        "rollouts of 50 control steps, {}",
+        InstructionSet::in_use().name()
+    ));
     group.sample_size(10);
     for (name, bodies, images) in cases {
         let images: Vec<Grid<f64>> = (0..images).map(stimulus).collect();
         let jobs: Vec<Job> = bodies
             .iter()
-            .map(|&body| Job { body, order: Vec::new(), may_win: Box::new(|_| true), given_up: None })
+            .map(|&body| Job {
+                body,
+                order: Vec::new(),
+                may_win: Box::new(|_| true),
+                given_up: None,
+            })
             .collect();
         group.throughput(Throughput::Elements((bodies.len() * images.len()) as u64));
         for threads in [1, 2] {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start");
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .expect("threads start");
             group.bench_function(format!("{name}, {threads} threads"), |bencher| {
                 let run = || {
                     evaluate(
@@ -124,24 +153,41 @@ fn bookkeeping(criterion: &mut Criterion) {
         out: folder.path().join("run"),
         if_exists: IfExists::Refuse,
     };
-    let run: RunFile = evolve(&options, &Session::default()).expect("the run ends").run;
+    let run: RunFile = evolve(&options, &Session::default())
+        .expect("the run ends")
+        .run;
     let mut known_bodies = KnownBodies::default();
     for i in 0..600_000_u128 {
         known_bodies.insert((i * 0x9E37_79B9_7F4A_7C15_F39C_C060_5CED_C834).to_le_bytes());
     }
-    let checkpoint = Checkpoint { run, totals: Totals::default(), known_bodies };
+    let checkpoint = Checkpoint {
+        run,
+        totals: Totals::default(),
+        known_bodies,
+    };
     let mut group = criterion.benchmark_group("bookkeeping");
     group.sample_size(10);
     group.bench_function("an offspring and its body", |bencher| {
         let (config, mut child) = (&options.config, 0);
-        let parents: Vec<&Genome> = checkpoint.run.elites.iter().map(|robot| &robot.genome).collect();
+        let parents: Vec<&Genome> = checkpoint
+            .run
+            .elites
+            .iter()
+            .map(|robot| &robot.genome)
+            .collect();
         bencher.iter(|| {
             child += 1;
             let mut rng = stream(1, Purpose::Mutation, 1, child);
-            parents[child as usize % parents.len()].offspring(config.body_spec(), &config.genome, &mut rng)
+            parents[child as usize % parents.len()].offspring(
+                config.body_spec(),
+                &config.genome,
+                &mut rng,
+            )
         });
     });
-    group.bench_function("run.json as text", |bencher| bencher.iter(|| checkpoint.run.to_json()));
+    group.bench_function("run.json as text", |bencher| {
+        bencher.iter(|| checkpoint.run.to_json())
+    });
     group.bench_function("a checkpoint after 600,000 bodies", |bencher| {
         bencher.iter(|| checkpoint::write(folder.path(), &checkpoint));
     });

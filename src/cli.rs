@@ -71,7 +71,10 @@ pub(crate) fn run(cli: Cli, console: &Console, ranks: Ranks) -> Result<(), Error
         // clap finds the conflict only if both are on the same side of the command's name.
         return Err(Error::usage("--quiet: expected without --json".to_string()));
     }
-    let is_shared = matches!(cli.command, Command::Evolve(_) | Command::Eval(_) | Command::Audit(_));
+    let is_shared = matches!(
+        cli.command,
+        Command::Evolve(_) | Command::Eval(_) | Command::Audit(_)
+    );
     if ranks.size() > 1 && !is_shared {
         let text = "MPI: expected evolve, eval or audit: several processes can share only these";
         return Err(Error::usage(text.to_string()).advice("start it without mpirun"));
@@ -98,11 +101,17 @@ pub(crate) fn run(cli: Cli, console: &Console, ranks: Ranks) -> Result<(), Error
             summary::configs(console, &[&config::BUILT_IN[..], &[PAPER_TOML]].concat());
             Ok(())
         }
-        Command::Config { name: Some(name), set } if PaperPlan::is_built_in(&name) => {
+        Command::Config {
+            name: Some(name),
+            set,
+        } if PaperPlan::is_built_in(&name) => {
             console.text(&PaperPlan::load(&name, &set)?.to_toml());
             Ok(())
         }
-        Command::Config { name: Some(name), set } => {
+        Command::Config {
+            name: Some(name),
+            set,
+        } => {
             console.text(&Config::load(&name, &set)?.to_toml());
             Ok(())
         }
@@ -122,15 +131,18 @@ pub(crate) fn run(cli: Cli, console: &Console, ranks: Ranks) -> Result<(), Error
         }
         Command::Bench { all } => {
             let sets: Vec<InstructionSet> = match all {
-                true => InstructionSet::ALL.into_iter().filter(|set| set.is_available()).collect(),
+                true => InstructionSet::ALL
+                    .into_iter()
+                    .filter(|set| set.is_available())
+                    .collect(),
                 false => vec![InstructionSet::in_use()],
             };
             summary::speeds(console, &bench::table(&sets));
             Ok(())
         }
         Command::Man { out: Some(out) } => {
-            let written =
-                std::fs::create_dir_all(&out).and_then(|()| clap_mangen::generate_to(Cli::command(), &out));
+            let written = std::fs::create_dir_all(&out)
+                .and_then(|()| clap_mangen::generate_to(Cli::command(), &out));
             written.map_err(|error| Error::writing(&out, &error))
         }
         Command::Man { out: None } => {
@@ -154,37 +166,63 @@ struct Resources {
 impl Resources {
     /// Returns the resources of one process.
     fn of(threads: Option<u16>, data: Option<PathBuf>) -> Self {
-        Resources { threads, data, ranks: Ranks::ALONE }
+        Resources {
+            threads,
+            data,
+            ranks: Ranks::ALONE,
+        }
     }
 }
 
 /// Runs a command in a session that signals can stop and that reports to the terminal.
 fn in_session<T>(
     console: &Console,
-    Resources { threads, data, ranks }: Resources,
+    Resources {
+        threads,
+        data,
+        ranks,
+    }: Resources,
     work: impl FnOnce(&Session) -> Result<T, Error>,
 ) -> Result<T, Error> {
     let (stop, reporter) = (signals::stop_flag()?, Reporter::new(console));
-    let session = Session::new(&stop, &reporter).threads(threads.map(usize::from)).ranks(ranks).data(data);
+    let session = Session::new(&stop, &reporter)
+        .threads(threads.map(usize::from))
+        .ranks(ranks)
+        .data(data);
     work(&session)
 }
 
 fn run_evolve(args: EvolveArgs, console: &Console, ranks: Ranks) -> Result<(), Error> {
     let mut set = args.set;
     set.extend(args.seed.map(|seed| format!("seed={seed}")));
-    set.extend(args.generations.map(|generations| format!("generations={generations}")));
+    set.extend(
+        args.generations
+            .map(|generations| format!("generations={generations}")),
+    );
     let config = Config::load(&args.config, &set)?;
     let name = folder::name_of(&args.config);
-    let out = args.out.unwrap_or_else(|| Path::new(folder::RUNS).join(format!("{name}-seed{}", config.seed)));
+    let out = args
+        .out
+        .unwrap_or_else(|| Path::new(folder::RUNS).join(format!("{name}-seed{}", config.seed)));
     let if_exists = match (args.resume, args.force) {
         (true, _) => IfExists::Resume,
         (_, true) => IfExists::Overwrite,
         _ => IfExists::Refuse,
     };
-    let with = || Resources { ranks, ..Resources::of(args.threads, args.data.clone()) };
-    let options = evolve::EvolveOptions { config, name, out: out.clone(), if_exists };
+    let with = || Resources {
+        ranks,
+        ..Resources::of(args.threads, args.data.clone())
+    };
+    let options = evolve::EvolveOptions {
+        config,
+        name,
+        out: out.clone(),
+        if_exists,
+    };
     let training = match args.train {
-        true => Some(in_session(console, with(), |session| train::after_evolution(&options, session))?),
+        true => Some(in_session(console, with(), |session| {
+            train::after_evolution(&options, session)
+        })?),
         false => None,
     };
     let finished = in_session(console, with(), |session| evolve::evolve(&options, session))?;
@@ -211,17 +249,29 @@ fn run_evolve(args: EvolveArgs, console: &Console, ranks: Ranks) -> Result<(), E
     }
     let out = training.map_or(out, |training| training.out);
     if args.replay && ranks.leads() {
-        let shown = replay::ReplayOptions { data: args.data, ..replay::ReplayOptions::default() };
+        let shown = replay::ReplayOptions {
+            data: args.data,
+            ..replay::ReplayOptions::default()
+        };
         replay_best(&out, shown, console)?;
     }
     Ok(())
 }
 
 /// Replays the best robot of a run into its folder.
-fn replay_best(folder: &Path, shown: replay::ReplayOptions, console: &Console) -> Result<(), Error> {
+fn replay_best(
+    folder: &Path,
+    shown: replay::ReplayOptions,
+    console: &Console,
+) -> Result<(), Error> {
     let (robot, archive) = (BEST.to_string(), Some(folder.join(RUN_JSON)));
-    let replay = replay::replay(&replay::ReplayOptions { robot, archive, ..shown })?;
-    let wanted = pictures::PicturesWanted::beside(folder, &replay.name, &[Format::Gif, Format::Html]);
+    let replay = replay::replay(&replay::ReplayOptions {
+        robot,
+        archive,
+        ..shown
+    })?;
+    let wanted =
+        pictures::PicturesWanted::beside(folder, &replay.name, &[Format::Gif, Format::Html]);
     pictures::make(console, &replay, &wanted).map(drop)
 }
 
@@ -243,13 +293,22 @@ fn run_eval(args: EvalArgs, console: &Console, ranks: Ranks) -> Result<(), Error
         out,
         archives,
     };
-    test(&options, Resources { ranks, ..Resources::of(args.threads, args.data) }, console)
+    test(
+        &options,
+        Resources {
+            ranks,
+            ..Resources::of(args.threads, args.data)
+        },
+        console,
+    )
 }
 
 /// Tests robots, and prints the results.
 fn test(options: &eval::EvalOptions, with: Resources, console: &Console) -> Result<(), Error> {
-    let eval::EvalOutcome { file: report, unwritten } =
-        in_session(console, with, |session| eval::eval(options, session))?;
+    let eval::EvalOutcome {
+        file: report,
+        unwritten,
+    } = in_session(console, with, |session| eval::eval(options, session))?;
     let capacity = CapacityFile::of(&report, &options.out);
     let written = unwritten.is_none().then_some(options.out.as_path());
     summary::evaluation(console, &report, capacity.as_ref(), written);
@@ -260,7 +319,10 @@ fn test(options: &eval::EvalOptions, with: Resources, console: &Console) -> Resu
         let text = match report.robots.len() {
             0 => "stopped before the first robot; nothing is written".to_string(),
             robots => {
-                format!("stopped after {}", counted(robots, "robot; it is saved", "robots; those are saved"))
+                format!(
+                    "stopped after {}",
+                    counted(robots, "robot; it is saved", "robots; those are saved")
+                )
             }
         };
         return Err(Error::stopped(text));
@@ -269,10 +331,22 @@ fn test(options: &eval::EvalOptions, with: Resources, console: &Console) -> Resu
 }
 
 fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
-    let ReplayArgs { physical_only, images, dataset, data, format, out, open, .. } = args;
+    let ReplayArgs {
+        physical_only,
+        images,
+        dataset,
+        data,
+        format,
+        out,
+        open,
+        ..
+    } = args;
     let (width, every, fps, look) = (args.width, usize::from(args.every), args.fps, args.look);
     // A wrong file name must be reported before the simulation starts.
-    let named = out.as_deref().map(|path| pictures::PicturesWanted::named(path, &format)).transpose()?;
+    let named = out
+        .as_deref()
+        .map(|path| pictures::PicturesWanted::named(path, &format))
+        .transpose()?;
     // Without a run, it shows the best body that ships with the program.
     let is_bare = args.archive.is_none() && args.robot == Selection::Ids(vec![BEST.to_string()]);
     let is_first_look = is_bare && folder::newest_run().is_err();
@@ -280,25 +354,55 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
         true => vec![folder::first_run(PathBuf::from(gallery::ZERO_ONE)).map_err(Error::other)?],
         false => args.archive.map_or(Vec::new(), |Runs(paths)| paths),
     };
-    let search = one_by_one::RobotChoice { robots: args.robot, archives, physical_only, seed: args.seed };
+    let search = one_by_one::RobotChoice {
+        robots: args.robot,
+        archives,
+        physical_only,
+        seed: args.seed,
+    };
     let Named { archive, robot } = the_one(&search, data.clone(), console)?;
     let folder = pictures::folder(&archive);
-    let options =
-        replay::ReplayOptions { robot, physical_only, archive: Some(archive), images, data, dataset };
+    let options = replay::ReplayOptions {
+        robot,
+        physical_only,
+        archive: Some(archive),
+        images,
+        data,
+        dataset,
+    };
     if is_first_look {
-        console.info(&format!("no run under runs/: the best body of {}", gallery::ZERO_ONE));
+        console.info(&format!(
+            "no run under runs/: the best body of {}",
+            gallery::ZERO_ONE
+        ));
     }
     let is_any = options.dataset.is_none() && options.data.is_none() && options.images.is_empty();
     let replay = match replay::replay(&options) {
         Err(error) if is_first_look && is_any && error.kind == ErrorKind::Input => {
-            console.info(&format!("{}; it sees the program's own digits instead", error.message));
-            replay::replay(&replay::ReplayOptions { dataset: Some(BUILTIN.to_string()), ..options })
+            console.info(&format!(
+                "{}; it sees the program's own digits instead",
+                error.message
+            ));
+            replay::replay(&replay::ReplayOptions {
+                dataset: Some(BUILTIN.to_string()),
+                ..options
+            })
         }
         replay => replay,
     }?;
-    let wanted = named.unwrap_or_else(|| pictures::PicturesWanted::beside(&folder, &replay.name, &format));
-    let made =
-        pictures::make(console, &replay, &pictures::PicturesWanted { width, every, fps, look, ..wanted })?;
+    let wanted =
+        named.unwrap_or_else(|| pictures::PicturesWanted::beside(&folder, &replay.name, &format));
+    let made = pictures::make(
+        console,
+        &replay,
+        &pictures::PicturesWanted {
+            width,
+            every,
+            fps,
+            look,
+            ..wanted
+        },
+    )?;
     match made.last().filter(|_| open) {
         Some(path) => show(path),
         None => Ok(()),
@@ -332,8 +436,16 @@ fn the_one(
     match found.as_slice() {
         [one] => Ok(one.clone()),
         several => {
-            let names: Vec<&str> = several.iter().take(5).map(|named| named.robot.as_str()).collect();
-            let more = if several.len() > names.len() { ", …" } else { "" };
+            let names: Vec<&str> = several
+                .iter()
+                .take(5)
+                .map(|named| named.robot.as_str())
+                .collect();
+            let more = if several.len() > names.len() {
+                ", …"
+            } else {
+                ""
+            };
             let these = format!("{} ({}{more})", several.len(), names.join(", "));
             many(these, names.first().copied().unwrap_or("best"))
         }
@@ -342,9 +454,12 @@ fn the_one(
 
 fn run_simulate(args: &SimulateArgs, console: &Console) -> Result<(), Error> {
     match &args.out {
-        Some(path) => {
-            simulate::to_file(&args.scenario, args.points, path, &Session::new(&*signals::stop_flag()?, &()))
-        }
+        Some(path) => simulate::to_file(
+            &args.scenario,
+            args.points,
+            path,
+            &Session::new(&*signals::stop_flag()?, &()),
+        ),
         None => {
             let scenario = simulate::Scenario::read(&args.scenario)?;
             let written = |row: String| {
@@ -357,8 +472,13 @@ fn run_simulate(args: &SimulateArgs, console: &Console) -> Result<(), Error> {
                 }
             };
             // The console knows why it was closed, as does `main` if results were lost.
-            simulate::simulate(&scenario, args.points, written)
-                .or_else(|error| if console.is_closed() { Ok(()) } else { Err(error) })
+            simulate::simulate(&scenario, args.points, written).or_else(|error| {
+                if console.is_closed() {
+                    Ok(())
+                } else {
+                    Err(error)
+                }
+            })
         }
     }
 }
@@ -366,41 +486,83 @@ fn run_simulate(args: &SimulateArgs, console: &Console) -> Result<(), Error> {
 fn run_data(command: DataCommand, console: &Console) -> Result<(), Error> {
     let given = |data: Option<&Path>| places(data, std::env::var_os("MORPHCOG_DATA"), None);
     match command {
-        DataCommand::Fetch { dataset, to, mirror, force } => {
-            let catalogue = Catalogue::named(&dataset).map_err(|error| Error::usage(error.to_string()))?;
+        DataCommand::Fetch {
+            dataset,
+            to,
+            mirror,
+            force,
+        } => {
+            let catalogue =
+                Catalogue::named(&dataset).map_err(|error| Error::usage(error.to_string()))?;
             let options = FetchOptions { to, mirror, force };
             let stop = signals::stop_flag()?;
-            let fetched =
-                fetch(&catalogue, &options, &Program::ALL, &Session::new(&stop, &Reporter::new(console)));
+            let fetched = fetch(
+                &catalogue,
+                &options,
+                &Program::ALL,
+                &Session::new(&stop, &Reporter::new(console)),
+            );
             if matches!(fetched, Err(FetchError::Stopped(_))) {
                 // Whole files stay, and there is nothing else to save.
                 stop.end_process();
             }
             summary::fetched(console, &fetched?);
         }
-        DataCommand::Info(DatasetArgs { dataset, data, transpose }) => {
+        DataCommand::Info(DatasetArgs {
+            dataset,
+            data,
+            transpose,
+        }) => {
             let found = data::info(&dataset, &given(data.as_deref()), transpose);
             let mut found = found?;
             // A missing split is reported; an unusable one is an error.
             let is_there = |(_, problem): &(Split, DatasetError)| {
-                !matches!(problem, DatasetError::Files(FilesError::Missing { content: "images", .. }))
+                !matches!(
+                    problem,
+                    DatasetError::Files(FilesError::Missing {
+                        content: "images",
+                        ..
+                    })
+                )
             };
-            let broken = found.problems.iter().position(is_there).map(|place| found.problems.remove(place));
+            let broken = found
+                .problems
+                .iter()
+                .position(is_there)
+                .map(|place| found.problems.remove(place));
             summary::dataset(console, &found);
             if let Some((split, problem)) = broken {
                 return Err(Error::input(format!("{split}: {problem}")));
             }
         }
-        DataCommand::Sheet { dataset: DatasetArgs { dataset, data, transpose }, samples, test, out } => {
-            if !out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
-                let text = format!("--out {}: expected a file name that ends in .png", out.display());
+        DataCommand::Sheet {
+            dataset:
+                DatasetArgs {
+                    dataset,
+                    data,
+                    transpose,
+                },
+            samples,
+            test,
+            out,
+        } => {
+            if !out
+                .extension()
+                .is_some_and(|ending| ending.eq_ignore_ascii_case("png"))
+            {
+                let text = format!(
+                    "--out {}: expected a file name that ends in .png",
+                    out.display()
+                );
                 return Err(Error::usage(text));
             }
             let split = if test { Split::Test } else { Split::Train };
             let dataset = Dataset::oriented(&dataset, &given(data.as_deref()), &[split], transpose);
             let dataset = dataset?;
             if dataset.is_transposed() && transpose.is_none() {
-                console.info("these files are EMNIST's, mirrored and turned: the images are transposed");
+                console.info(
+                    "these files are EMNIST's, mirrored and turned: the images are transposed",
+                );
             }
             let made = sheet::contact_sheet(&dataset, split, samples)
                 .and_then(|sheet| sheet::write_png(&out, &sheet));

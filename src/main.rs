@@ -1,7 +1,12 @@
 //! The morphcog command.
 
 #![forbid(unsafe_code)]
-#![deny(clippy::panic, clippy::print_stderr, clippy::print_stdout, clippy::unwrap_used)]
+#![deny(
+    clippy::panic,
+    clippy::print_stderr,
+    clippy::print_stdout,
+    clippy::unwrap_used
+)]
 
 use std::process::ExitCode;
 

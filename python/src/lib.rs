@@ -33,7 +33,9 @@ use morphcog::task::answer;
 use morphcog::task::evaluation::fresh_rollouts;
 use morphcog::task::protocol::{MAX_ROW, MAX_STEPS, Protocol, RolloutMode};
 use morphcog::task::stimulus::stimulus;
-use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{
+    PyArray1, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
+};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
@@ -51,8 +53,18 @@ mod exceptions {
     use pyo3::create_exception;
     use pyo3::exceptions::PyException;
 
-    create_exception!(morphcog, Error, PyException, "What morphcog refuses or fails with, in its own words.");
-    create_exception!(morphcog, Unstable, Error, "A simulation became unstable and ended.");
+    create_exception!(
+        morphcog,
+        Error,
+        PyException,
+        "What morphcog refuses or fails with, in its own words."
+    );
+    create_exception!(
+        morphcog,
+        Unstable,
+        Error,
+        "A simulation became unstable and ended."
+    );
 }
 
 /// Width of a robot's picture in a notebook \[pixels\].
@@ -94,7 +106,9 @@ fn no_memory(what: &str) -> PyErr {
 /// Returns an empty list with room for so many numbers.
 fn room<T>(count: Option<usize>, what: &str) -> PyResult<Vec<T>> {
     let mut list = Vec::new();
-    count.and_then(|count| list.try_reserve_exact(count).ok()).ok_or_else(|| no_memory(what))?;
+    count
+        .and_then(|count| list.try_reserve_exact(count).ok())
+        .ok_or_else(|| no_memory(what))?;
     Ok(list)
 }
 
@@ -102,7 +116,12 @@ fn room<T>(count: Option<usize>, what: &str) -> PyResult<Vec<T>> {
 /// main thread, which would wait for them.
 fn check_interrupt(py: Python) -> PyResult<()> {
     py.check_signals()?;
-    match py.import("morphcog")?.getattr("_main_is_interrupted")?.call0()?.is_truthy()? {
+    match py
+        .import("morphcog")?
+        .getattr("_main_is_interrupted")?
+        .call0()?
+        .is_truthy()?
+    {
         true => Err(PyKeyboardInterrupt::new_err(())),
         false => Ok(()),
     }
@@ -148,7 +167,9 @@ fn watched_and<T: Send>(
             interrupted = look(py).err();
         }
         match (interrupted, found) {
-            (_, Err(_)) => Err(PyRuntimeError::new_err("a bug of morphcog; what it said stands above")),
+            (_, Err(_)) => Err(PyRuntimeError::new_err(
+                "a bug of morphcog; what it said stands above",
+            )),
             (Some(error), _) => Err(error),
             (None, Ok(found)) => Ok(found),
         }
@@ -187,7 +208,10 @@ const WARNING: &str = "warning";
 
 impl Heard {
     fn new() -> Self {
-        Heard { began: Instant::now(), said: Mutex::default() }
+        Heard {
+            began: Instant::now(),
+            said: Mutex::default(),
+        }
     }
 
     fn said(&self) -> MutexGuard<'_, Said> {
@@ -201,7 +225,9 @@ impl Heard {
     /// Passes the messages to a Python function.
     fn pass_on(&self, listener: &Bound<PyAny>) -> PyResult<()> {
         let lines = std::mem::take(&mut self.said().lines);
-        lines.into_iter().try_for_each(|(kind, text)| listener.call1((kind, text)).map(drop))
+        lines
+            .into_iter()
+            .try_for_each(|(kind, text)| listener.call1((kind, text)).map(drop))
     }
 }
 
@@ -227,7 +253,9 @@ impl Observer for Heard {
 
     fn generation(&self, now: &Generation) {
         let mut said = self.said();
-        let recent = said.evolution.get_or_insert(Recent::new(self.seconds(), *now));
+        let recent = said
+            .evolution
+            .get_or_insert(Recent::new(self.seconds(), *now));
         let (seconds, before) = recent.since(self.seconds(), *now, |now| now.done);
         let line = generation_line(now, &before, seconds);
         said.moved(line);
@@ -240,7 +268,8 @@ impl Observer for Heard {
 
 /// Parses a value that Python gives as text.
 fn parsed<T: FromStr<Err: std::fmt::Display>>(keyword: &str, text: &str) -> PyResult<T> {
-    text.parse().map_err(|error| refused(format!("{keyword}={text}: {error}")))
+    text.parse()
+        .map_err(|error| refused(format!("{keyword}={text}: {error}")))
 }
 
 /// Makes a body from an array of materials.
@@ -263,7 +292,12 @@ fn body(voxels: &PyReadonlyArray2<u8>) -> PyResult<Body> {
 
 fn array<'py>(py: Python<'py>, body: &Body) -> Bound<'py, PyArray2<u8>> {
     let (height, width) = (body.height(), body.width());
-    let codes: Vec<u8> = body.voxels().cells().iter().map(|material| material.code()).collect();
+    let codes: Vec<u8> = body
+        .voxels()
+        .cells()
+        .iter()
+        .map(|material| material.code())
+        .collect();
     PyArray2::from_owned_array(
         py,
         numpy::ndarray::Array2::from_shape_vec((height, width), codes).expect("as many"),
@@ -281,9 +315,13 @@ fn seen(pixels: numpy::ndarray::ArrayView2<f64>, body: &Body) -> PyResult<Grid<f
         )));
     }
     if let Some(pixel) = pixels.iter().find(|pixel| !(0.0..=1.0).contains(*pixel)) {
-        return Err(refused(format!("stimulus: expected pixels from 0 to 1, found {pixel}")));
+        return Err(refused(format!(
+            "stimulus: expected pixels from 0 to 1, found {pixel}"
+        )));
     }
-    Ok(Grid::from_fn(height, width, |row, column| pixels[(row, column)]))
+    Ok(Grid::from_fn(height, width, |row, column| {
+        pixels[(row, column)]
+    }))
 }
 
 /// A config, and the name of its runs; see `morphcog.Config`.
@@ -301,7 +339,10 @@ impl ConfigData {
         let _environment = entered()?;
         let source = config.to_string_lossy();
         let inner = config::Config::load(&source, &set).map_err(|error| raised(&error))?;
-        Ok(ConfigData { inner, name: folder::name_of(&source) })
+        Ok(ConfigData {
+            inner,
+            name: folder::name_of(&source),
+        })
     }
 
     /// Parses a config from the text of `to_toml`.
@@ -327,8 +368,17 @@ impl ConfigData {
 
     /// Describes the config in a few words.
     fn about(&self) -> String {
-        let config::Config { seed, generations, body, data, .. } = &self.inner;
-        let tasks = self.inner.grouping().expect("a config's groups are checked when it is read");
+        let config::Config {
+            seed,
+            generations,
+            body,
+            data,
+            ..
+        } = &self.inner;
+        let tasks = self
+            .inner
+            .grouping()
+            .expect("a config's groups are checked when it is read");
         let tasks: Vec<String> = tasks.tasks().iter().map(|task| task.name()).collect();
         let task = match &tasks[..] {
             [one] => one.clone(),
@@ -367,7 +417,11 @@ impl RunData {
             true => path.clone(),
             false => std::path::absolute(path)?,
         };
-        Ok(RunData { run, path: path.clone(), place })
+        Ok(RunData {
+            run,
+            path: path.clone(),
+            place,
+        })
     }
 
     #[getter]
@@ -387,7 +441,10 @@ impl RunData {
 
     #[getter]
     fn config(&self) -> ConfigData {
-        ConfigData { inner: self.run.config.clone(), name: self.run.name.clone() }
+        ConfigData {
+            inner: self.run.config.clone(),
+            name: self.run.name.clone(),
+        }
     }
 
     #[getter]
@@ -414,24 +471,42 @@ impl RunData {
         };
         let found = replay::find(&options).map_err(|error| raised(&error))?;
         let known = self.run.elites.iter().find(|elite| elite.id == found.name);
-        let elite = known
-            .ok_or_else(|| refused(format!("{}: the run has changed; load it anew", self.path.display())))?;
-        Ok((elite.id.clone(), elite.task.clone(), elite.objective, array(py, &elite.body)))
+        let elite = known.ok_or_else(|| {
+            refused(format!(
+                "{}: the run has changed; load it anew",
+                self.path.display()
+            ))
+        })?;
+        Ok((
+            elite.id.clone(),
+            elite.task.clone(),
+            elite.objective,
+            array(py, &elite.body),
+        ))
     }
 
     /// Returns a page on which the robot walks under its training images.
     fn page(&self, py: Python, robot: String) -> PyResult<String> {
         let _environment = entered()?;
-        self.shown(py, robot, |replay, title| Ok(html::page(&replay.recording, title, &replay.about)?))
+        self.shown(py, robot, |replay, title| {
+            Ok(html::page(&replay.recording, title, &replay.about)?)
+        })
     }
 
     /// Returns a small page, and a GIF of the last moment.
-    fn small_page<'py>(&self, py: Python<'py>, robot: String) -> PyResult<(String, Bound<'py, PyBytes>)> {
+    fn small_page<'py>(
+        &self,
+        py: Python<'py>,
+        robot: String,
+    ) -> PyResult<(String, Bound<'py, PyBytes>)> {
         let _environment = entered()?;
         let (page, still) = self.shown(py, robot, |replay, title| {
             let walk = Walk::new(&replay.recording)?;
             let still = gif::still(&walk, walk.frames() - 1, WIDTH)?;
-            Ok((html::small_page(&replay.recording, title, &replay.about)?, still))
+            Ok((
+                html::small_page(&replay.recording, title, &replay.about)?,
+                still,
+            ))
         })?;
         Ok((page, PyBytes::new(py, &still)))
     }
@@ -577,13 +652,19 @@ fn evolve_run(
 ) -> PyResult<PathBuf> {
     let _environment = entered()?;
     let (config, name) = (config.inner.clone(), config.name.clone());
-    let out = out.unwrap_or_else(|| Path::new(folder::RUNS).join(format!("{name}-seed{}", config.seed)));
+    let out =
+        out.unwrap_or_else(|| Path::new(folder::RUNS).join(format!("{name}-seed{}", config.seed)));
     let if_exists = match (resume, force) {
         (true, _) => IfExists::Resume,
         (_, true) => IfExists::Overwrite,
         _ => IfExists::Refuse,
     };
-    let options = evolve::EvolveOptions { config, name, out: out.clone(), if_exists };
+    let options = evolve::EvolveOptions {
+        config,
+        name,
+        out: out.clone(),
+        if_exists,
+    };
     let unwritten = heard(py, listener, (threads, data), |session| {
         evolve::evolve(&options, session).map(|finished| finished.unwritten)
     })?;
@@ -621,7 +702,8 @@ fn stimuli<'py>(
         }
         Ok(all)
     })??;
-    let array = numpy::ndarray::Array3::from_shape_vec((count, height, width), all).expect("as many as said");
+    let array = numpy::ndarray::Array3::from_shape_vec((count, height, width), all)
+        .expect("as many as said");
     Ok(PyArray3::from_owned_array(py, array))
 }
 
@@ -638,7 +720,9 @@ fn images<'py>(
         "train" => Split::Train,
         "test" => Split::Test,
         other => {
-            return Err(refused(format!("split={other:?}: expected \"train\" or \"test\"")));
+            return Err(refused(format!(
+                "split={other:?}: expected \"train\" or \"test\""
+            )));
         }
     };
     let places = places(data.as_deref(), std::env::var_os("MORPHCOG_DATA"), None);
@@ -646,7 +730,8 @@ fn images<'py>(
     let (pixels, labels, [height, width]) = watched(py, |stop| -> PyResult<_> {
         let loaded = Dataset::load(dataset, &places, &[split]).map_err(failed)?;
         let count = loaded.len(split);
-        let (mut pixels, mut labels, mut size) = (Vec::new(), room(Some(count), "the labels")?, [0, 0]);
+        let (mut pixels, mut labels, mut size) =
+            (Vec::new(), room(Some(count), "the labels")?, [0, 0]);
         for index in (0..count).take_while(|_| !stop.load(Ordering::Relaxed)) {
             let image = loaded.image(split, index).map_err(failed)?;
             if index == 0 {
@@ -659,7 +744,10 @@ fn images<'py>(
         Ok((pixels, labels, size))
     })??;
     let pixels = numpy::ndarray::Array3::from_shape_vec((labels.len(), height, width), pixels);
-    Ok((PyArray3::from_owned_array(py, pixels.expect("images of one size")), PyArray1::from_vec(py, labels)))
+    Ok((
+        PyArray3::from_owned_array(py, pixels.expect("images of one size")),
+        PyArray1::from_vec(py, labels),
+    ))
 }
 
 /// Returns displacements; see `morphcog.displacements`.
@@ -677,7 +765,11 @@ fn displacements<'py>(
     let bodies = bodies.iter().map(body).collect::<PyResult<Vec<Body>>>()?;
     let (physics, protocol) = setting(config);
     let control_steps = control_steps.unwrap_or(protocol.control_steps);
-    let protocol = Protocol { rollout: RolloutMode::Fresh, control_steps, ..protocol };
+    let protocol = Protocol {
+        rollout: RolloutMode::Fresh,
+        control_steps,
+        ..protocol
+    };
     let view = stimuli.as_array();
     let seen_by = |number: usize, place: usize| {
         let pixels = view.index_axis(numpy::ndarray::Axis(0), number);
@@ -687,7 +779,9 @@ fn displacements<'py>(
     let (count, shown) = (bodies.len(), stimuli.shape()[0]);
     // All bodies must have one size, as the stimuli of the first are used for all.
     let size = |body: &Body| (body.height(), body.width());
-    if let Some(place) = bodies.iter().position(|body| size(body) != size(&bodies[0]))
+    if let Some(place) = bodies
+        .iter()
+        .position(|body| size(body) != size(&bodies[0]))
         && shown > 0
     {
         seen_by(0, 0)?;
@@ -700,19 +794,40 @@ fn displacements<'py>(
     // Tried as a whole, since a lack of memory for single images could not be reported.
     drop(room::<(Grid<f64>, f64)>(Some(shown_to_any), "the stimuli")?);
     drop(room::<f64>(Some(stimuli.len()), "the stimuli")?);
-    let images = (0..shown_to_any).map(|number| seen_by(number, 0)).collect::<PyResult<Vec<Grid<f64>>>>()?;
+    let images = (0..shown_to_any)
+        .map(|number| seen_by(number, 0))
+        .collect::<PyResult<Vec<Grid<f64>>>>()?;
     let pool = pool(threads).map_err(|error| raised(&error))?;
     let walked = watched(py, |stop| {
         let walk = |body: &Body| -> Result<Vec<f64>, Stopped> {
-            let (found, _) =
-                fresh_rollouts(body, &images, &[], (&physics, &protocol), &|_| (), &Session::new(stop, &()))?;
-            Ok(found.into_iter().map(|walk| walk.unwrap_or(f64::NAN)).collect())
+            let (found, _) = fresh_rollouts(
+                body,
+                &images,
+                &[],
+                (&physics, &protocol),
+                &|_| (),
+                &Session::new(stop, &()),
+            )?;
+            Ok(found
+                .into_iter()
+                .map(|walk| walk.unwrap_or(f64::NAN))
+                .collect())
         };
-        pool.install(|| bodies.par_iter().with_max_len(1).map(walk).collect::<Result<Vec<_>, Stopped>>())
+        pool.install(|| {
+            bodies
+                .par_iter()
+                .with_max_len(1)
+                .map(walk)
+                .collect::<Result<Vec<_>, Stopped>>()
+        })
     })?;
-    let all: Vec<f64> =
-        walked.expect("only Ctrl-C stops it, which is raised above").into_iter().flatten().collect();
-    let array = numpy::ndarray::Array2::from_shape_vec((count, shown), all).expect("as many as said");
+    let all: Vec<f64> = walked
+        .expect("only Ctrl-C stops it, which is raised above")
+        .into_iter()
+        .flatten()
+        .collect();
+    let array =
+        numpy::ndarray::Array2::from_shape_vec((count, shown), all).expect("as many as said");
     Ok(PyArray2::from_owned_array(py, array))
 }
 
@@ -743,16 +858,30 @@ impl WorldData {
         let (physics, protocol) = setting(config);
         let (lowest, row) = (physics.ground_row, start_row.unwrap_or(protocol.start_row));
         if !(lowest..=MAX_ROW).contains(&row) {
-            return Err(refused(format!("start_row={row}: expected {lowest} (on the ground) to {MAX_ROW}")));
+            return Err(refused(format!(
+                "start_row={row}: expected {lowest} (on the ground) to {MAX_ROW}"
+            )));
         }
-        let start = Start { column: protocol.start_column, row };
+        let start = Start {
+            column: protocol.start_column,
+            row,
+        };
         let world = morphcog::sim::World::new(System::new(&body, physics), start);
-        Ok(WorldData { simulation: Mutex::new(Simulation { world, unstable: None }), body })
+        Ok(WorldData {
+            simulation: Mutex::new(Simulation {
+                world,
+                unstable: None,
+            }),
+            body,
+        })
     }
 
     /// Returns a copy in its present state.
     fn copied(&self, py: Python) -> Self {
-        WorldData { simulation: Mutex::new(self.simulation(py).clone()), body: self.body.clone() }
+        WorldData {
+            simulation: Mutex::new(self.simulation(py).clone()),
+            body: self.body.clone(),
+        }
     }
 
     fn set_stimulus(&self, py: Python, pixels: PyReadonlyArray2<f64>) -> PyResult<()> {
@@ -768,7 +897,8 @@ impl WorldData {
         let mut left = count;
         loop {
             let steps = left.min(STEPS);
-            py.detach(|| self.locked().step(steps)).map_err(Unstable::new_err)?;
+            py.detach(|| self.locked().step(steps))
+                .map_err(Unstable::new_err)?;
             left -= steps;
             if left == 0 {
                 return Ok(());
@@ -801,8 +931,11 @@ impl WorldData {
     fn points<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         let _environment = FloatEnvironment::standard();
         let simulation = self.simulation(py);
-        let places: Vec<f64> =
-            simulation.world.points().flat_map(|place| simulation.lengths(place)).collect();
+        let places: Vec<f64> = simulation
+            .world
+            .points()
+            .flat_map(|place| simulation.lengths(place))
+            .collect();
         let array = numpy::ndarray::Array2::from_shape_vec((places.len() / 2, 2), places);
         PyArray2::from_owned_array(py, array.expect("two coordinates a point"))
     }
@@ -810,8 +943,12 @@ impl WorldData {
     /// Returns the corners of each voxel as indices of points, clockwise from the top left.
     #[getter]
     fn voxels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<usize>> {
-        let corners: Vec<usize> =
-            self.simulation(py).world.voxels().flat_map(|(_, corners)| corners).collect();
+        let corners: Vec<usize> = self
+            .simulation(py)
+            .world
+            .voxels()
+            .flat_map(|(_, corners)| corners)
+            .collect();
         let array = numpy::ndarray::Array2::from_shape_vec((corners.len() / 4, 4), corners);
         PyArray2::from_owned_array(py, array.expect("four corners a voxel"))
     }
@@ -820,11 +957,15 @@ impl WorldData {
 impl WorldData {
     /// Locks the simulation, without waiting for a thread that needs Python's lock.
     fn simulation(&self, py: Python) -> MutexGuard<'_, Simulation> {
-        self.simulation.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner)
+        self.simulation
+            .lock_py_attached(py)
+            .unwrap_or_else(PoisonError::into_inner)
     }
 
     fn locked(&self) -> MutexGuard<'_, Simulation> {
-        self.simulation.lock().unwrap_or_else(PoisonError::into_inner)
+        self.simulation
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -834,7 +975,9 @@ impl Simulation {
         if let Some(text) = &self.unstable {
             return Err(format!("{text}; begin anew with reset()"));
         }
-        let stepped = (0..count).try_for_each(|_| self.world.step()).map_err(|error| error.to_string());
+        let stepped = (0..count)
+            .try_for_each(|_| self.world.step())
+            .map_err(|error| error.to_string());
         self.unstable = stepped.clone().err();
         stepped
     }
@@ -842,7 +985,10 @@ impl Simulation {
     /// Converts a position to voxel lengths, with y from the ground.
     fn lengths(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let physics = self.world.system().physics();
-        [x / physics.cell_size, y / physics.cell_size - f64::from(physics.ground_row)]
+        [
+            x / physics.cell_size,
+            y / physics.cell_size - f64::from(physics.ground_row),
+        ]
     }
 }
 

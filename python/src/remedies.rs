@@ -8,8 +8,14 @@ use morphcog::cli::explain::spell;
 pub(crate) fn explained(error: &Error) -> String {
     let mut text = match &error.argument {
         // Errors in changes of a config name the key themselves.
-        Some(Argument { name: "set", value: Some(value) }) => format!("{value}: {}", error.message),
-        Some(Argument { name, value: Some(value) }) => format!("{name}={value}: {}", error.message),
+        Some(Argument {
+            name: "set",
+            value: Some(value),
+        }) => format!("{value}: {}", error.message),
+        Some(Argument {
+            name,
+            value: Some(value),
+        }) => format!("{name}={value}: {}", error.message),
         Some(Argument { name, value: None }) => format!("{name}: {}", error.message),
         None => error.message.clone(),
     };

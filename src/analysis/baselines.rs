@@ -29,7 +29,10 @@ pub(crate) struct PixelRule {
 
 /// Returns the accuracy of always answering with the larger group.
 pub(crate) fn larger_group(split: &ClassSplit, images: &[LabelledImage]) -> f64 {
-    let a = images.iter().filter(|image| split.group(image.class) == Some(Group::A)).count();
+    let a = images
+        .iter()
+        .filter(|image| split.group(image.class) == Some(Group::A))
+        .count();
     a.max(images.len() - a) as f64 / images.len().max(1) as f64
 }
 
@@ -37,13 +40,18 @@ pub(crate) fn larger_group(split: &ClassSplit, images: &[LabelledImage]) -> f64 
 /// tie. Returns `None` without images.
 pub(crate) fn best_pixel(split: &ClassSplit, images: &[LabelledImage]) -> Option<PixelRule> {
     let first = images.first()?.stimulus;
-    let total_a = images.iter().filter(|image| split.group(image.class) == Some(Group::A)).count();
+    let total_a = images
+        .iter()
+        .filter(|image| split.group(image.class) == Some(Group::A))
+        .count();
     let mut best: Option<(usize, PixelRule)> = None;
     for row in 0..first.height() {
         for column in 0..first.width() {
             let value = |image: &LabelledImage| image.stimulus.or_default((row, column));
-            let mut sorted: Vec<(f64, bool)> =
-                images.iter().map(|i| (value(i), split.group(i.class) == Some(Group::A))).collect();
+            let mut sorted: Vec<(f64, bool)> = images
+                .iter()
+                .map(|i| (value(i), split.group(i.class) == Some(Group::A)))
+                .collect();
             sorted.sort_by(|x, y| x.0.total_cmp(&y.0));
             // With the threshold after i images, A may be the answer below it, or B.
             let mut a_below = 0;
@@ -54,11 +62,20 @@ pub(crate) fn best_pixel(split: &ClassSplit, images: &[LabelledImage]) -> Option
                 }
                 let b_below = i + 1 - a_below;
                 let right_if_a_below = a_below + (images.len() - total_a - b_below);
-                for (right, above) in
-                    [(right_if_a_below, Group::B), (images.len() - right_if_a_below, Group::A)]
-                {
+                for (right, above) in [
+                    (right_if_a_below, Group::B),
+                    (images.len() - right_if_a_below, Group::A),
+                ] {
                     if best.as_ref().is_none_or(|(most, _)| right > *most) {
-                        best = Some((right, PixelRule { row, column, level: *level, above }));
+                        best = Some((
+                            right,
+                            PixelRule {
+                                row,
+                                column,
+                                level: *level,
+                                above,
+                            },
+                        ));
                     }
                 }
             }
@@ -72,9 +89,15 @@ impl PixelRule {
     pub(crate) fn accuracy(&self, split: &ClassSplit, images: &[LabelledImage]) -> f64 {
         let answer = |image: &LabelledImage| {
             let value = image.stimulus.or_default((self.row, self.column));
-            if (value > self.level) == (self.above == Group::A) { Group::A } else { Group::B }
+            if (value > self.level) == (self.above == Group::A) {
+                Group::A
+            } else {
+                Group::B
+            }
         };
-        share(images, |image| split.group(image.class) == Some(answer(image)))
+        share(images, |image| {
+            split.group(image.class) == Some(answer(image))
+        })
     }
 }
 
@@ -84,7 +107,11 @@ pub(crate) fn nearest_training_image(
     training: &[LabelledImage],
     images: &[LabelledImage],
 ) -> f64 {
-    let known = || training.iter().filter_map(|other| Some((other.stimulus, split.group(other.class)?)));
+    let known = || {
+        training
+            .iter()
+            .filter_map(|other| Some((other.stimulus, split.group(other.class)?)))
+    };
     share(images, |image| {
         let answer = nearest(known(), image.stimulus);
         answer.is_some() && answer == split.group(image.class)
@@ -110,14 +137,26 @@ mod tests {
         let split = &grouping.tasks()[0];
         let zeros = [grid([0.1, 0.9, 0.0, 0.3]), grid([0.8, 0.7, 0.0, 0.4])];
         let others = [grid([0.1, 0.2, 0.0, 0.3]), grid([0.9, 0.4, 0.0, 0.9])];
-        let of = |list: &'static [u8], grids: &'static [Grid<f64>]| -> Vec<LabelledImage<'static>> {
-            list.iter().zip(grids).map(|(&class, stimulus)| LabelledImage { stimulus, class }).collect()
-        };
+        let of =
+            |list: &'static [u8], grids: &'static [Grid<f64>]| -> Vec<LabelledImage<'static>> {
+                list.iter()
+                    .zip(grids)
+                    .map(|(&class, stimulus)| LabelledImage { stimulus, class })
+                    .collect()
+            };
         let zeros: &'static _ = Box::leak(Box::new(zeros));
         let others: &'static _ = Box::leak(Box::new(others));
         let images = [of(&[0, 0], zeros), of(&[1, 2], others)].concat();
         let rule = best_pixel(split, &images).unwrap();
-        assert_eq!(rule, PixelRule { row: 0, column: 1, level: 0.4, above: Group::A });
+        assert_eq!(
+            rule,
+            PixelRule {
+                row: 0,
+                column: 1,
+                level: 0.4,
+                above: Group::A
+            }
+        );
         assert_eq!(rule.accuracy(split, &images), 1.0);
         assert_eq!(rule.accuracy(split, &images[2..]), 1.0);
         assert_eq!(larger_group(split, &images[1..]), 2.0 / 3.0);

@@ -60,7 +60,8 @@ impl Findings {
     /// Reads results that match the present state of these runs, from the place of these archives'
     /// results. Only a single run has verdicts.
     fn read(archives: &[PathBuf], runs: &[&RunFile], warn: &dyn Fn(&str)) -> Self {
-        let existing = |name: &str| Some(folder::beside_all(archives, name)).filter(|path| exists(path));
+        let existing =
+            |name: &str| Some(folder::beside_all(archives, name)).filter(|path| exists(path));
         // A report of what can be read is better than none.
         let told = |error: Error| warn(&format!("{error}; left out"));
         let audit = match (runs, archives) {
@@ -68,7 +69,9 @@ impl Findings {
             _ => None,
         };
         let tested = existing(EVAL_JSON);
-        let eval = tested.clone().and_then(|path| EvalFile::of_runs(&path, runs).map_err(told).ok());
+        let eval = tested
+            .clone()
+            .and_then(|path| EvalFile::of_runs(&path, runs).map_err(told).ok());
         let is_of_it = |capacity: &CapacityFile| match (&eval, &tested) {
             (Some(eval), _) => capacity.is_of(eval),
             (None, is_there) => is_there.is_none(),
@@ -84,7 +87,11 @@ impl Findings {
             }
             Some(capacity)
         });
-        Findings { eval, audit, capacity }
+        Findings {
+            eval,
+            audit,
+            capacity,
+        }
     }
 }
 
@@ -129,23 +136,42 @@ pub(crate) fn gather(
     for path in archives {
         let run = RunFile::read(path)?;
         let progress = match exists(&path.with_file_name(METRICS)) {
-            true => Progress::of(&run, path).map_err(|error| warn(&format!("{error}; left out"))).ok(),
+            true => Progress::of(&run, path)
+                .map_err(|error| warn(&format!("{error}; left out")))
+                .ok(),
             false => None,
         };
         let whereabouts = Whereabouts::given(data).and_of(path);
-        let images = if with_rollouts { images(&run, path, &whereabouts)? } else { Vec::new() };
+        let images = if with_rollouts {
+            images(&run, path, &whereabouts)?
+        } else {
+            Vec::new()
+        };
         let findings = Findings::read(std::slice::from_ref(path), &[&run], warn);
-        runs.push(Dossier { path: path.clone(), namesake: None, run, progress, findings, images });
+        runs.push(Dossier {
+            path: path.clone(),
+            namesake: None,
+            run,
+            progress,
+            findings,
+            images,
+        });
     }
-    let named: Vec<(String, u64)> =
-        runs.iter().map(|dossier| (dossier.run.name.clone(), dossier.run.config.seed)).collect();
-    let count =
-        |name: &(String, u64), among: &[(String, u64)]| among.iter().filter(|other| *other == name).count();
+    let named: Vec<(String, u64)> = runs
+        .iter()
+        .map(|dossier| (dossier.run.name.clone(), dossier.run.config.seed))
+        .collect();
+    let count = |name: &(String, u64), among: &[(String, u64)]| {
+        among.iter().filter(|other| *other == name).count()
+    };
     for (number, dossier) in runs.iter_mut().enumerate() {
         let name = &named[number];
         dossier.namesake = (count(name, &named) > 1).then(|| count(name, &named[..number]));
     }
-    different(runs.iter().map(|dossier| (dossier.path.as_path(), &dossier.run)))?;
+    different(
+        runs.iter()
+            .map(|dossier| (dossier.path.as_path(), &dossier.run)),
+    )?;
     let together = match archives.len() {
         0 | 1 => Findings::default(),
         _ => {
@@ -155,24 +181,41 @@ pub(crate) fn gather(
     };
     let team = match folder::beside_all(archives, TEAM_JSON) {
         path if archives.len() > 1 && path.exists() => {
-            let whereabouts = archives.iter().fold(Whereabouts::given(data), |all, path| all.and_of(path));
+            let whereabouts = archives
+                .iter()
+                .fold(Whereabouts::given(data), |all, path| all.and_of(path));
             let found = Team::read(&path, &runs, with_rollouts.then_some(&whereabouts));
-            found.map_err(|error| warn(&format!("{error}; left out"))).ok()
+            found
+                .map_err(|error| warn(&format!("{error}; left out")))
+                .ok()
         }
         _ => None,
     };
-    Ok(Gathered { runs, together, team })
+    Ok(Gathered {
+        runs,
+        together,
+        team,
+    })
 }
 
 impl Team {
     /// Reads a team that has answered, all of these runs; without `whereabouts`, it has no images.
-    fn read(path: &Path, runs: &[Dossier], whereabouts: Option<&Whereabouts>) -> Result<Self, Error> {
+    fn read(
+        path: &Path,
+        runs: &[Dossier],
+        whereabouts: Option<&Whereabouts>,
+    ) -> Result<Self, Error> {
         let file = TeamFile::read(path)?;
         let wrong = |text: &str| Error::input(format!("{}: {text}", path.display()));
         if file.answers.is_none() {
-            return Err(wrong("this test was stopped: expected the answers of a whole team"));
+            return Err(wrong(
+                "this test was stopped: expected the answers of a whole team",
+            ));
         }
-        let hashes: Vec<String> = runs.iter().map(|dossier| dossier.run.fingerprint()).collect();
+        let hashes: Vec<String> = runs
+            .iter()
+            .map(|dossier| dossier.run.fingerprint())
+            .collect();
         let of_member = |member: &Member| {
             let run = hashes.iter().position(|hash| *hash == member.run_sha256)?;
             let is_it = |robot: &Robot| robot.id == member.id && robot.body == member.body;
@@ -181,10 +224,18 @@ impl Team {
         let of: Option<Vec<usize>> = file.members.iter().map(of_member).collect();
         let of = of.ok_or_else(|| wrong("expected a team of robots of these runs"))?;
         let is_first = |(place, image): &(usize, &ImageRef)| {
-            file.images.iter().position(|other| other.label == image.label) == Some(*place)
+            file.images
+                .iter()
+                .position(|other| other.label == image.label)
+                == Some(*place)
         };
-        let mut images: Vec<usize> =
-            file.images.iter().enumerate().filter(is_first).map(|(place, _)| place).collect();
+        let mut images: Vec<usize> = file
+            .images
+            .iter()
+            .enumerate()
+            .filter(is_first)
+            .map(|(place, _)| place)
+            .collect();
         let (Some(whereabouts), Some(first)) = (whereabouts, of.first()) else {
             return Ok(Team {
                 file,
@@ -201,14 +252,31 @@ impl Team {
             let one = |place: &usize| {
                 let ImageRef { index, label } = file.images[*place];
                 let stimulus = see(config, &dataset, split, index)?;
-                Ok(LabelledStimulus { class: label, label: format!("{label} ({split} {index})"), stimulus })
+                Ok(LabelledStimulus {
+                    class: label,
+                    label: format!("{label} ({split} {index})"),
+                    stimulus,
+                })
             };
-            images.iter().map(one).collect::<Result<Vec<LabelledStimulus>, Error>>()
+            images
+                .iter()
+                .map(one)
+                .collect::<Result<Vec<LabelledStimulus>, Error>>()
         };
         let of_members = of.iter().map(|run| &runs[*run].run.config);
-        let together = seen(&Config::together(of_members).expect("the first member's is among them"))?;
-        let seen = runs.iter().map(|dossier| seen(&dossier.run.config)).collect::<Result<_, Error>>()?;
-        Ok(Team { file, runs: of, images, seen, together })
+        let together =
+            seen(&Config::together(of_members).expect("the first member's is among them"))?;
+        let seen = runs
+            .iter()
+            .map(|dossier| seen(&dossier.run.config))
+            .collect::<Result<_, Error>>()?;
+        Ok(Team {
+            file,
+            runs: of,
+            images,
+            seen,
+            together,
+        })
     }
 
     /// Records the rollout of a member under one of the images to watch it with.
@@ -216,19 +284,38 @@ impl Team {
         let run = self.runs[member];
         let config = &runs[run].run.config;
         let control_steps = control_steps(config, self.file.cycles);
-        let protocol = Protocol { control_steps, ..config.protocol.clone() };
+        let protocol = Protocol {
+            control_steps,
+            ..config.protocol.clone()
+        };
         let Member { id, body, .. } = &self.file.members[member];
-        record(id, body, &config.physics, &protocol, true, std::slice::from_ref(&self.seen[run][image]))
+        record(
+            id,
+            body,
+            &config.physics,
+            &protocol,
+            true,
+            std::slice::from_ref(&self.seen[run][image]),
+        )
     }
 }
 
 /// Returns the training images, or one per class if there are many.
-fn images(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Vec<LabelledStimulus>, Error> {
+fn images(
+    run: &RunFile,
+    path: &Path,
+    whereabouts: &Whereabouts,
+) -> Result<Vec<LabelledStimulus>, Error> {
     let without = |error: Error| match error.remedies.is_empty() {
         true => error.remedy(Remedy::LeaveOutRollouts),
         false => error,
     };
-    let dataset = load_dataset_of(Some(&run.dataset), &run.config, whereabouts, &[Split::Train]);
+    let dataset = load_dataset_of(
+        Some(&run.dataset),
+        &run.config,
+        whereabouts,
+        &[Split::Train],
+    );
     let dataset = dataset.map_err(without)?;
     let mut shown: Vec<ImageRef> = run.training_images.clone();
     if shown.len() > MOST_IMAGES {
@@ -243,9 +330,16 @@ fn images(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<Vec<L
     let one = |image: &ImageRef| {
         let label = format!("{} (train {})", image.label, image.index);
         let seen = see(&run.config, &dataset, Split::Train, image.index);
-        let seen =
-            seen.map_err(|error| error.in_place("training_images").in_place(&path.display().to_string()));
-        Ok(LabelledStimulus { class: image.label, label, stimulus: seen? })
+        let seen = seen.map_err(|error| {
+            error
+                .in_place("training_images")
+                .in_place(&path.display().to_string())
+        });
+        Ok(LabelledStimulus {
+            class: image.label,
+            label,
+            stimulus: seen?,
+        })
     };
     shown.iter().map(one).collect()
 }
@@ -271,9 +365,18 @@ impl Dossier {
     pub(crate) fn record(&self, robot: &Robot) -> Recording {
         let config = &self.run.config;
         let fresh = config.protocol.rollout == RolloutMode::Fresh;
-        let recording =
-            record(&robot.id, &robot.body, &config.physics, &config.protocol, fresh, &self.images);
-        Recording { judge: self.run.judge(robot), ..recording }
+        let recording = record(
+            &robot.id,
+            &robot.body,
+            &config.physics,
+            &config.protocol,
+            fresh,
+            &self.images,
+        );
+        Recording {
+            judge: self.run.judge(robot),
+            ..recording
+        }
     }
 
     /// Returns the seconds of the run and its number of offspring; `None` without a metrics.csv.
@@ -286,12 +389,24 @@ impl Dossier {
     /// farthest from all before (in voxels that differ), among those fitter than 0.
     pub(crate) fn most_different(&self, count: usize) -> Vec<&Robot> {
         let able = || self.run.elites.iter().filter(|robot| robot.objective > 0.0);
-        let mut chosen: Vec<&Robot> =
-            self.run.best().filter(|best| best.objective > 0.0).into_iter().collect();
+        let mut chosen: Vec<&Robot> = self
+            .run
+            .best()
+            .filter(|best| best.objective > 0.0)
+            .into_iter()
+            .collect();
         while !chosen.is_empty() && chosen.len() < count {
-            let nearest =
-                |robot: &Robot| chosen.iter().map(|other| distance(robot, other)).min().unwrap_or(0);
-            match able().max_by_key(|robot| nearest(robot)).filter(|robot| nearest(robot) > 0) {
+            let nearest = |robot: &Robot| {
+                chosen
+                    .iter()
+                    .map(|other| distance(robot, other))
+                    .min()
+                    .unwrap_or(0)
+            };
+            match able()
+                .max_by_key(|robot| nearest(robot))
+                .filter(|robot| nearest(robot) > 0)
+            {
                 Some(robot) => chosen.push(robot),
                 None => break,
             }
@@ -302,7 +417,13 @@ impl Dossier {
 
 /// Counts the voxels in which two bodies of one size differ.
 fn distance(a: &Robot, b: &Robot) -> usize {
-    a.body.voxels().cells().iter().zip(b.body.voxels().cells()).filter(|(a, b)| a != b).count()
+    a.body
+        .voxels()
+        .cells()
+        .iter()
+        .zip(b.body.voxels().cells())
+        .filter(|(a, b)| a != b)
+        .count()
 }
 
 #[cfg(test)]
@@ -326,10 +447,15 @@ mod tests {
     #[test]
     fn the_most_different_begin_with_the_fittest_and_leave_out_who_fails() {
         let dossier = dossier(&[("a", 1.0), ("b", 9.0), ("c", -1.0), ("d", 2.0)]);
-        let chosen: Vec<&str> = dossier.most_different(9).iter().map(|robot| robot.id.as_str()).collect();
+        let chosen: Vec<&str> = dossier
+            .most_different(9)
+            .iter()
+            .map(|robot| robot.id.as_str())
+            .collect();
         assert_eq!(chosen[0], "b");
         assert!(!chosen.contains(&"c") && chosen.len() <= 3, "{chosen:?}");
-        let [a, d] = [0, 3].map(|place| distance(&dossier.run.elites[place], &dossier.run.elites[1]));
+        let [a, d] =
+            [0, 3].map(|place| distance(&dossier.run.elites[place], &dossier.run.elites[1]));
         assert_eq!(chosen.get(1), Some(&if d >= a { "d" } else { "a" }));
     }
 
@@ -348,6 +474,9 @@ mod tests {
         let here = [folder.path().join(RUN_JSON)];
         let findings = Findings::read(&here, &[], &|text| told.borrow_mut().push(text.to_string()));
         assert!(findings.eval.is_none() && findings.audit.is_none() && findings.capacity.is_none());
-        assert!(told.borrow().len() == 1 && told.borrow()[0].contains("eval.json"), "{told:?}");
+        assert!(
+            told.borrow().len() == 1 && told.borrow()[0].contains("eval.json"),
+            "{told:?}"
+        );
     }
 }

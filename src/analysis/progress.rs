@@ -38,35 +38,58 @@ pub(crate) struct SettingsGroup<'a> {
 pub(crate) fn alike(runs: &[Progress]) -> (Vec<String>, Vec<SettingsGroup<'_>>) {
     let mut groups: Vec<Vec<&Progress>> = Vec::new();
     for run in runs {
-        match groups.iter_mut().find(|group| group[0].settings == run.settings) {
+        match groups
+            .iter_mut()
+            .find(|group| group[0].settings == run.settings)
+        {
             Some(group) => group.push(run),
             None => groups.push(vec![run]),
         }
     }
     let from_first = |group: &Vec<&Progress>| differing(&groups[0][0].settings, &group[0].settings);
-    let keys: BTreeSet<String> = groups.iter().flat_map(from_first).map(|(key, ..)| key).collect();
+    let keys: BTreeSet<String> = groups
+        .iter()
+        .flat_map(from_first)
+        .map(|(key, ..)| key)
+        .collect();
     let value = |run: &Progress, key: &String| run.settings.get(key).map(spoken);
     let group = |runs: &Vec<&'_ Progress>| -> (String, Vec<Option<String>>) {
         let values: Vec<Option<String>> = keys.iter().map(|key| value(runs[0], key)).collect();
         let word = |(key, value): (&String, &Option<String>)| match (key.as_str(), value) {
             ("task.groups", Some(value)) => Some(value.clone()),
             (_, None) => None,
-            (key, Some(value)) => Some(format!("{}={value}", key.rsplit('.').next().unwrap_or(key))),
+            (key, Some(value)) => {
+                Some(format!("{}={value}", key.rsplit('.').next().unwrap_or(key)))
+            }
         };
         let words: Vec<String> = keys.iter().zip(&values).filter_map(word).collect();
         // Two configs with the same settings may have two names, and are one group all the same.
-        (if words.is_empty() { runs[0].run.clone() } else { words.join(", ") }, values)
+        (
+            if words.is_empty() {
+                runs[0].run.clone()
+            } else {
+                words.join(", ")
+            },
+            values,
+        )
     };
     let described: Vec<(String, Vec<Option<String>>)> = groups.iter().map(group).collect();
     let keys = keys.into_iter().collect();
-    let group = |((label, values), runs)| SettingsGroup { label, values, runs };
+    let group = |((label, values), runs)| SettingsGroup {
+        label,
+        values,
+        runs,
+    };
     (keys, described.into_iter().zip(groups).map(group).collect())
 }
 
 /// A value of a config for people: groups of classes as 0|1.
 fn spoken(value: &toml::Value) -> String {
     let classes = |list: &toml::Value| -> Option<Vec<u8>> {
-        list.as_array()?.iter().map(|class| class.as_integer().and_then(|c| u8::try_from(c).ok())).collect()
+        list.as_array()?
+            .iter()
+            .map(|class| class.as_integer().and_then(|c| u8::try_from(c).ok()))
+            .collect()
     };
     let groups = || -> Option<String> {
         let [a, b] = value.as_array()?.as_slice() else {
@@ -74,7 +97,11 @@ fn spoken(value: &toml::Value) -> String {
         };
         Some(groups_text([&classes(a)?, &classes(b)?], "|"))
     };
-    groups().unwrap_or_else(|| value.as_str().map_or_else(|| value.to_string(), str::to_string))
+    groups().unwrap_or_else(|| {
+        value
+            .as_str()
+            .map_or_else(|| value.to_string(), str::to_string)
+    })
 }
 
 impl Progress {
@@ -87,7 +114,13 @@ impl Progress {
         let unit = run.fitness().unit();
         let mut settings = run.config.settings();
         settings.remove("seed");
-        Ok(Progress { run: run.name.clone(), seed: run.config.seed, unit, moments, settings })
+        Ok(Progress {
+            run: run.name.clone(),
+            seed: run.config.seed,
+            unit,
+            moments,
+            settings,
+        })
     }
 }
 
@@ -97,16 +130,28 @@ mod tests {
 
     fn run(seed: u64, config: &str) -> Progress {
         let set = |config: &str| toml::from_str::<Settings>(config).unwrap();
-        Progress { run: "toy".into(), seed, unit: None, moments: Vec::new(), settings: set(config) }
+        Progress {
+            run: "toy".into(),
+            seed,
+            unit: None,
+            moments: Vec::new(),
+            settings: set(config),
+        }
     }
 
     #[test]
     fn runs_that_differ_in_the_seed_only_are_one_group() {
-        let (a, b) = ("\"map.parents\" = 1\n\"task.groups\" = [[0], [1]]", "\"map.parents\" = 2");
+        let (a, b) = (
+            "\"map.parents\" = 1\n\"task.groups\" = [[0], [1]]",
+            "\"map.parents\" = 2",
+        );
         let runs = [run(1, a), run(1, b), run(2, a)];
         let (keys, groups) = alike(&runs);
         assert_eq!(keys, ["map.parents", "task.groups"]);
-        let labels: Vec<(&str, usize)> = groups.iter().map(|g| (g.label.as_str(), g.runs.len())).collect();
+        let labels: Vec<(&str, usize)> = groups
+            .iter()
+            .map(|g| (g.label.as_str(), g.runs.len()))
+            .collect();
         assert_eq!(labels, [("parents=1, 0|1", 2), ("parents=2", 1)]);
         assert_eq!(groups[1].values, [Some("2".to_string()), None]);
         let (keys, groups) = alike(&runs[..1]);

@@ -140,16 +140,27 @@ impl<'a> Columns<'a> {
 
 /// The table as CSV: a row per task and what its robots tell apart; a column per varied key.
 pub(crate) fn csv(rows: &[SweepRow]) -> Vec<u8> {
-    let mut keys: Vec<&String> = rows.iter().flat_map(|row| row.varied.iter().map(|(key, _)| key)).collect();
+    let mut keys: Vec<&String> = rows
+        .iter()
+        .flat_map(|row| row.varied.iter().map(|(key, _)| key))
+        .collect();
     keys.sort_unstable();
     keys.dedup();
     let about = ["number", "name", "state"].map(str::to_string);
     let varied = keys.iter().map(|key| format!("varied_{key}"));
     let fields = rows.iter().map(|row| {
-        let of =
-            |key: &&String| row.varied.iter().find(|(own, _)| own == *key).map(|(_, value)| value.as_str());
+        let of = |key: &&String| {
+            row.varied
+                .iter()
+                .find(|(own, _)| own == *key)
+                .map(|(_, value)| value.as_str())
+        };
         let varied: Vec<Option<&str>> = keys.iter().map(of).collect();
-        ((row.number, &row.name, row.state.name()), varied, Columns::of(row))
+        (
+            (row.number, &row.name, row.state.name()),
+            varied,
+            Columns::of(row),
+        )
     });
     let more = Columns::NAMES.map(str::to_string);
     table::csv(about.into_iter().chain(varied).chain(more), fields)

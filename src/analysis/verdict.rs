@@ -34,34 +34,53 @@ impl<'a> Behaviour<'a> {
         classes: &[u8],
         plain: Vec<f64>,
     ) -> Self {
-        let answer = |(&class, &d): (&u8, &f64)| Answer { class, displacement: Some(d) };
+        let answer = |(&class, &d): (&u8, &f64)| Answer {
+            class,
+            displacement: Some(d),
+        };
         let answers: Vec<_> = classes.iter().zip(&plain).map(answer).collect();
         let assignment = Assignment::from_training(split, fitness, &answers);
         let right = |group| assignment.expected(group) == Direction::Right;
-        let rightward: Vec<Option<bool>> =
-            classes.iter().map(|&class| split.group(class).map(right)).collect();
-        let asked: Vec<usize> = (0..plain.len()).filter(|&image| rightward[image].is_some()).collect();
-        let is_right = |&image: &usize| towards(rightward[image], plain[image]) > criteria.threshold;
+        let rightward: Vec<Option<bool>> = classes
+            .iter()
+            .map(|&class| split.group(class).map(right))
+            .collect();
+        let asked: Vec<usize> = (0..plain.len())
+            .filter(|&image| rightward[image].is_some())
+            .collect();
+        let is_right =
+            |&image: &usize| towards(rightward[image], plain[image]) > criteria.threshold;
         let answered: Vec<usize> = asked.iter().copied().filter(is_right).collect();
         // A robot with many wrong answers is still a walker if it walks; tests measure its
         // accuracy.
         let walks = |&&image: &&usize| Direction::of(plain[image], criteria.threshold).is_some();
         let walked = asked.iter().filter(walks).count();
-        let groups = [Group::A, Group::B].into_iter().filter(|&group| !split.classes(group).is_empty());
+        let groups = [Group::A, Group::B]
+            .into_iter()
+            .filter(|&group| !split.classes(group).is_empty());
         let shares: Vec<(Group, f64)> = groups
             .map(|group| {
-                let count =
-                    |of: &[usize]| of.iter().filter(|&&i| split.group(classes[i]) == Some(group)).count();
+                let count = |of: &[usize]| {
+                    of.iter()
+                        .filter(|&&i| split.group(classes[i]) == Some(group))
+                        .count()
+                };
                 (group, count(&answered) as f64 / count(&asked).max(1) as f64)
             })
             .collect();
-        let balanced = shares.iter().map(|(_, share)| share).sum::<f64>() / shares.len().max(1) as f64;
+        let balanced =
+            shares.iter().map(|(_, share)| share).sum::<f64>() / shares.len().max(1) as f64;
         let flaw = if let Some((group, _)) = shares.iter().find(|(_, share)| *share == 0.0) {
             let classes: Vec<String> = split.classes(*group).iter().map(u8::to_string).collect();
             let (threshold, classes) = (criteria.threshold, classes.join(", "));
-            Some(format!("never walks more than {threshold} voxel lengths the correct way for {classes}"))
+            Some(format!(
+                "never walks more than {threshold} voxel lengths the correct way for {classes}"
+            ))
         } else if (walked as f64) < criteria.least_answered * asked.len() as f64 {
-            Some(format!("answers {walked} of {} training images", asked.len()))
+            Some(format!(
+                "answers {walked} of {} training images",
+                asked.len()
+            ))
         } else if balanced <= CHANCE {
             Some(format!(
                 "answers {} % of its training images correctly, balanced",
@@ -70,7 +89,13 @@ impl<'a> Behaviour<'a> {
         } else {
             None
         };
-        Behaviour { criteria, plain, rightward, answered, flaw }
+        Behaviour {
+            criteria,
+            plain,
+            rightward,
+            answered,
+            flaw,
+        }
     }
 
     /// Returns true if the robot can be audited.
@@ -88,14 +113,28 @@ impl<'a> Behaviour<'a> {
         let along = |of: &[f64], image: usize| towards(self.rightward[image], of[image]);
         let (mut kept, mut distance) = (0.0, 0.0);
         if let Some(changed) = &displacements {
-            let right = self.answered.iter().filter(|&&i| along(changed, i) > self.criteria.least_walk);
+            let right = self
+                .answered
+                .iter()
+                .filter(|&&i| along(changed, i) > self.criteria.least_walk);
             kept = right.count() as f64 / self.answered.len().max(1) as f64;
             let sum = |of: &[f64]| self.answered.iter().map(|&i| along(of, i)).sum::<f64>();
             let whole = sum(&self.plain);
-            distance = if whole > 0.0 { sum(changed) / whole } else { 0.0 };
+            distance = if whole > 0.0 {
+                sum(changed) / whole
+            } else {
+                0.0
+            };
         }
         let persists = kept >= self.criteria.least_kept && distance >= self.criteria.least_distance;
-        PerturbedRollout { name, kind, displacements, kept, distance, persists }
+        PerturbedRollout {
+            name,
+            kind,
+            displacements,
+            kept,
+            distance,
+            persists,
+        }
     }
 
     /// Returns the verdict and its reason.
@@ -104,19 +143,36 @@ impl<'a> Behaviour<'a> {
             return (Verdict::NotAWalker, flaw.clone());
         }
         let failed = |kind: &&PerturbationKind| {
-            rollouts.iter().any(|rollout| rollout.kind == **kind && !rollout.persists)
+            rollouts
+                .iter()
+                .any(|rollout| rollout.kind == **kind && !rollout.persists)
         };
-        let failed: Vec<PerturbationKind> = PerturbationKind::ALL.iter().filter(failed).copied().collect();
-        let world = || rollouts.iter().filter(|rollout| rollout.kind.is_of_the_world());
+        let failed: Vec<PerturbationKind> = PerturbationKind::ALL
+            .iter()
+            .filter(failed)
+            .copied()
+            .collect();
+        let world = || {
+            rollouts
+                .iter()
+                .filter(|rollout| rollout.kind.is_of_the_world())
+        };
         let robust = world().filter(|rollout| rollout.persists).count() as f64;
         let is_robust = robust >= self.criteria.least_robust * world().count() as f64;
         let names = |of_the_world: bool| {
-            let names = failed.iter().filter(|kind| kind.is_of_the_world() == of_the_world);
-            names.map(|kind| kind.name().to_string()).collect::<Vec<_>>()
+            let names = failed
+                .iter()
+                .filter(|kind| kind.is_of_the_world() == of_the_world);
+            names
+                .map(|kind| kind.name().to_string())
+                .collect::<Vec<_>>()
         };
         let (artefacts, mut broken) = (names(false), names(true));
         if artefacts.is_empty() && broken.is_empty() {
-            return (Verdict::Physical, format!("persists in all {} changed rollouts", rollouts.len()));
+            return (
+                Verdict::Physical,
+                format!("persists in all {} changed rollouts", rollouts.len()),
+            );
         }
         if is_robust && !artefacts.is_empty() {
             return (Verdict::Exploits, artefacts.join(", "));
@@ -128,9 +184,12 @@ impl<'a> Behaviour<'a> {
     /// Returns the root mean square difference of displacements between perturbed and unperturbed
     /// rollouts \[voxel lengths\]; unstable rollouts are left out.
     pub(crate) fn spread(&self, rollouts: &[PerturbedRollout]) -> f64 {
-        let stable = rollouts.iter().filter_map(|rollout| rollout.displacements.as_ref());
-        let squares: Vec<f64> =
-            stable.flat_map(|d| d.iter().zip(&self.plain).map(|(a, b)| (a - b) * (a - b))).collect();
+        let stable = rollouts
+            .iter()
+            .filter_map(|rollout| rollout.displacements.as_ref());
+        let squares: Vec<f64> = stable
+            .flat_map(|d| d.iter().zip(&self.plain).map(|(a, b)| (a - b) * (a - b)))
+            .collect();
         // The sum of no terms is −0; adding 0.0 makes it 0.
         ((squares.iter().sum::<f64>() + 0.0) / squares.len().max(1) as f64).sqrt()
     }
@@ -154,7 +213,12 @@ mod tests {
     fn judged(rollouts: &[(PerturbationKind, [f64; 2])]) -> (Verdict, String) {
         let criteria = Criteria::default();
         let split = Grouping::two_groups(&[0], &[1]).unwrap().tasks()[0].clone();
-        let behaviour = Behaviour::new(&criteria, (&split, Fitness::Min), &[0, 1], vec![-10.0, 12.0]);
+        let behaviour = Behaviour::new(
+            &criteria,
+            (&split, Fitness::Min),
+            &[0, 1],
+            vec![-10.0, 12.0],
+        );
         let rollout = |(kind, d): &(PerturbationKind, [f64; 2])| {
             behaviour.compare(String::new(), *kind, Some(d.to_vec()))
         };
@@ -175,34 +239,62 @@ mod tests {
         let but = |lost: &[PerturbationKind]| {
             judged(&PerturbationKind::ALL.map(|k| (k, if lost.contains(&k) { LOST } else { SAME })))
         };
-        assert_eq!(but(&[PerturbationKind::TimeStep]), (Verdict::Exploits, "time step".to_string()));
-        assert_eq!(but(&[PerturbationKind::Start, PerturbationKind::LengthLimits]).1, "start, length limits");
-        assert_eq!(but(&[PerturbationKind::Gravity]), (Verdict::Fragile, "gravity".to_string()));
+        assert_eq!(
+            but(&[PerturbationKind::TimeStep]),
+            (Verdict::Exploits, "time step".to_string())
+        );
+        assert_eq!(
+            but(&[PerturbationKind::Start, PerturbationKind::LengthLimits]).1,
+            "start, length limits"
+        );
+        assert_eq!(
+            but(&[PerturbationKind::Gravity]),
+            (Verdict::Fragile, "gravity".to_string())
+        );
         let all = but(&[
             PerturbationKind::Gravity,
             PerturbationKind::Pixel,
             PerturbationKind::Friction,
             PerturbationKind::TimeStep,
         ]);
-        assert_eq!(all, (Verdict::Fragile, "friction, gravity, pixel noise, time step".to_string()));
+        assert_eq!(
+            all,
+            (
+                Verdict::Fragile,
+                "friction, gravity, pixel noise, time step".to_string()
+            )
+        );
     }
 
     #[test]
     fn a_walk_persists_by_direction_threshold_and_distance() {
         let criteria = Criteria::default();
         let split = Grouping::two_groups(&[0], &[1]).unwrap().tasks()[0].clone();
-        let behaviour = Behaviour::new(&criteria, (&split, Fitness::Min), &[0, 1], vec![-10.0, 12.0]);
-        let compare =
-            |d: Option<[f64; 2]>| behaviour.compare("x".into(), PerturbationKind::Start, d.map(Vec::from));
+        let behaviour = Behaviour::new(
+            &criteria,
+            (&split, Fitness::Min),
+            &[0, 1],
+            vec![-10.0, 12.0],
+        );
+        let compare = |d: Option<[f64; 2]>| {
+            behaviour.compare("x".into(), PerturbationKind::Start, d.map(Vec::from))
+        };
         assert!(compare(Some([-9.0, 30.0])).persists);
         // Below the threshold for an answer.
         assert!(compare(Some([-9.0, 2.9])).persists && !compare(Some([-9.0, 1.5])).persists);
         let turned = compare(Some([9.0, 30.0]));
         assert_eq!((turned.kept, turned.persists), (0.5, false));
         let short = compare(Some([-4.0, 4.0]));
-        assert_eq!((short.kept, short.distance, short.persists), (1.0, 8.0 / 22.0, false));
+        assert_eq!(
+            (short.kept, short.distance, short.persists),
+            (1.0, 8.0 / 22.0, false)
+        );
         assert!(!compare(None).persists);
-        let rollouts = [compare(Some([-13.0, 12.0])), compare(None), compare(Some([-10.0, 15.0]))];
+        let rollouts = [
+            compare(Some([-13.0, 12.0])),
+            compare(None),
+            compare(Some([-10.0, 15.0])),
+        ];
         assert_eq!(behaviour.spread(&rollouts), (18.0f64 / 4.0).sqrt());
     }
 
@@ -211,16 +303,29 @@ mod tests {
         let criteria = Criteria::default();
         let splits = Grouping::all_splits(&[0, 1, 2, 3], false).unwrap();
         let split = &splits.tasks()[0];
-        let flaw =
-            |d: [f64; 4]| Behaviour::new(&criteria, (split, Fitness::Min), &[0, 1, 2, 3], d.to_vec()).flaw;
+        let flaw = |d: [f64; 4]| {
+            Behaviour::new(&criteria, (split, Fitness::Min), &[0, 1, 2, 3], d.to_vec()).flaw
+        };
         assert_eq!(split.name(), "0|123");
         assert_eq!(flaw([5.0, -4.0, -9.0, -2.0]), None);
-        assert_eq!(flaw([5.0, -4.0, -1.0, -2.0]).unwrap(), "answers 2 of 4 training images");
-        assert!(flaw([2.0, -4.0, -9.0, -8.0]).is_some_and(|flaw| flaw.ends_with("the correct way for 0")));
+        assert_eq!(
+            flaw([5.0, -4.0, -1.0, -2.0]).unwrap(),
+            "answers 2 of 4 training images"
+        );
+        assert!(
+            flaw([2.0, -4.0, -9.0, -8.0])
+                .is_some_and(|flaw| flaw.ends_with("the correct way for 0"))
+        );
         // A low accuracy is no flaw of a walker, but accuracy at chance is.
         assert_eq!(flaw([9.0, -8.0, 4.0, 4.0]), None);
         let flaw = |d: &[f64], classes: &[u8]| {
-            Behaviour::new(&criteria, (split, Fitness::MeanClipped), classes, d.to_vec()).flaw
+            Behaviour::new(
+                &criteria,
+                (split, Fitness::MeanClipped),
+                classes,
+                d.to_vec(),
+            )
+            .flaw
         };
         assert_eq!(flaw(&[5.0, -4.0, -9.0, -8.0, -8.0], &[0, 0, 1, 2, 3]), None);
         let halves = [5.0, -5.0, -4.0, 4.0];
@@ -228,14 +333,25 @@ mod tests {
             flaw(&halves, &[0, 0, 1, 2]).unwrap(),
             "answers 50 % of its training images correctly, balanced"
         );
-        let still = Behaviour::new(&criteria, (split, Fitness::Min), &[0, 1, 2, 3], vec![0.0; 4]);
+        let still = Behaviour::new(
+            &criteria,
+            (split, Fitness::Min),
+            &[0, 1, 2, 3],
+            vec![0.0; 4],
+        );
         assert_eq!(still.judge(&[]).0, Verdict::NotAWalker);
     }
 
     #[test]
     fn criteria_are_read_checked_and_named() {
         let set = |text: &str| Criteria::load(None, &[text.to_string()]);
-        assert_eq!(set("perturbations.time_step=[8]").unwrap().perturbations.time_step, [8]);
+        assert_eq!(
+            set("perturbations.time_step=[8]")
+                .unwrap()
+                .perturbations
+                .time_step,
+            [8]
+        );
         assert_eq!(set("threshold=2").unwrap().threshold, 2.0);
         let wrong = [
             "threshold=-1",

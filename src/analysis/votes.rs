@@ -31,11 +31,18 @@ impl Ballot {
         threshold: f64,
         clip: f64,
     ) -> Self {
-        let mut ballot = Ballot { votes: vec![0; classes.len()], sums: vec![0.0; classes.len()], silent: 0 };
+        let mut ballot = Ballot {
+            votes: vec![0; classes.len()],
+            sums: vec![0.0; classes.len()],
+            silent: 0,
+        };
         for (sides, walk) in walks {
             let walk = walk.unwrap_or(0.0);
-            let (towards, away) =
-                if walk > 0.0 { (&sides.right, &sides.left) } else { (&sides.left, &sides.right) };
+            let (towards, away) = if walk > 0.0 {
+                (&sides.right, &sides.left)
+            } else {
+                (&sides.left, &sides.right)
+            };
             let votes = walk.abs() > threshold;
             ballot.silent += usize::from(!votes);
             let length = walk.abs().min(clip);
@@ -99,7 +106,11 @@ impl Tally {
         let ballot = Ballot::count(classes, walks, threshold, clip);
         let has_votes = ballot.votes.iter().any(|votes| *votes > 0);
         let says = has_votes.then(|| classes[ballot.by_votes().0]);
-        Tally { moved, ballot, says }
+        Tally {
+            moved,
+            ballot,
+            says,
+        }
     }
 }
 
@@ -111,21 +122,36 @@ impl Accuracy {
             right += usize::from(answer == expected);
             all += 1;
         }
-        Accuracy { right, accuracy: right as f64 / all.max(1) as f64, interval: wilson(right, all) }
+        Accuracy {
+            right,
+            accuracy: right as f64 / all.max(1) as f64,
+            interval: wilson(right, all),
+        }
     }
 }
 
 impl Member {
     /// Creates a member from a run's robot and its displacements, with its accuracy.
     pub(crate) fn new(trial: &Trial, run_sha256: &str, displacements: Vec<Option<f64>>) -> Self {
-        let Trial { run, robot, split, images, threshold } = *trial;
+        let Trial {
+            run,
+            robot,
+            split,
+            images,
+            threshold,
+        } = *trial;
         let assignment = Assignment::from_training(split, run.fitness(), &run.answers(robot));
         let is_right = |(image, walk): (&ImageRef, &Option<f64>)| {
             is_correct(split, assignment, image.label, *walk, threshold)
         };
-        let own = images.iter().zip(&displacements).filter_map(is_right).map(|is_right| (is_right, true));
+        let own = images
+            .iter()
+            .zip(&displacements)
+            .filter_map(is_right)
+            .map(|is_right| (is_right, true));
         let own = Accuracy::of(own);
-        let is_still = |walk: &&Option<f64>| walk.is_none_or(|walk| Direction::of(walk, threshold).is_none());
+        let is_still =
+            |walk: &&Option<f64>| walk.is_none_or(|walk| Direction::of(walk, threshold).is_none());
         let still = displacements.iter().filter(is_still).count();
         Member {
             id: robot.id.clone(),
@@ -144,7 +170,12 @@ impl Member {
 
 impl Decoded {
     fn new(classes: &[u8], images: &[ImageRef], places: &[usize]) -> Self {
-        let place_of = |class: u8| classes.iter().position(|other| *other == class).unwrap_or(0);
+        let place_of = |class: u8| {
+            classes
+                .iter()
+                .position(|other| *other == class)
+                .unwrap_or(0)
+        };
         let mut confusion = vec![vec![0; classes.len()]; classes.len()];
         for (image, answer) in images.iter().zip(places) {
             confusion[place_of(image.label)][*answer] += 1;
@@ -155,7 +186,12 @@ impl Decoded {
         };
         let answers: Vec<u8> = places.iter().map(|place| classes[*place]).collect();
         Decoded {
-            accuracy: Accuracy::of(answers.iter().copied().zip(images.iter().map(|image| image.label))),
+            accuracy: Accuracy::of(
+                answers
+                    .iter()
+                    .copied()
+                    .zip(images.iter().map(|image| image.label)),
+            ),
             per_class: classes.iter().enumerate().map(share).collect(),
             confusion,
             answers,
@@ -166,17 +202,24 @@ impl Decoded {
 impl TeamFile {
     /// Counts the votes of all walks under an image.
     fn ballot(&self, sides: &[Readout], image: usize) -> Ballot {
-        let walks =
-            sides.iter().zip(&self.members).map(|(sides, member)| (sides, member.displacements[image]));
+        let walks = sides
+            .iter()
+            .zip(&self.members)
+            .map(|(sides, member)| (sides, member.displacements[image]));
         Ballot::count(&self.classes, walks, self.threshold, self.clip)
     }
 
     /// Returns the members' joint answers to all images.
     pub(crate) fn decided(&self) -> Answers {
         let sides: Vec<Readout> = self.members.iter().map(Member::judge).collect();
-        let ballots: Vec<Ballot> = (0..self.images.len()).map(|image| self.ballot(&sides, image)).collect();
+        let ballots: Vec<Ballot> = (0..self.images.len())
+            .map(|image| self.ballot(&sides, image))
+            .collect();
         let knows = |class: &u8| {
-            sides.iter().filter(|sides| sides.left.contains(class) || sides.right.contains(class)).count()
+            sides
+                .iter()
+                .filter(|sides| sides.left.contains(class) || sides.right.contains(class))
+                .count()
         };
         let known: Vec<usize> = self.classes.iter().map(knows).collect();
         let by_votes: Vec<(usize, bool)> = ballots.iter().map(Ballot::by_votes).collect();
@@ -184,14 +227,18 @@ impl TeamFile {
         let places: Vec<usize> = by_votes.iter().map(|(place, _)| *place).collect();
         let count = self.images.len().max(1) as f64;
         let agreement = ballots.iter().zip(&places);
-        let agreement =
-            agreement.map(|(ballot, place)| ballot.votes[*place] as f64 / known[*place].max(1) as f64);
+        let agreement = agreement
+            .map(|(ballot, place)| ballot.votes[*place] as f64 / known[*place].max(1) as f64);
         Answers {
             votes: Decoded::new(&self.classes, &self.images, &places),
             walks: Decoded::new(&self.classes, &self.images, &by_walks),
             ties: by_votes.iter().filter(|(_, tied)| *tied).count() as f64 / count,
             agreement: agreement.sum::<f64>() / count,
-            not_moved: ballots.iter().map(|ballot| ballot.silent as f64).sum::<f64>() / count,
+            not_moved: ballots
+                .iter()
+                .map(|ballot| ballot.silent as f64)
+                .sum::<f64>()
+                / count,
         }
     }
 
@@ -200,17 +247,27 @@ impl TeamFile {
         let alone = |(place, member): (usize, &Member)| {
             let sides = member.judge();
             let answer = |(image, walk): (&ImageRef, &Option<f64>)| {
-                let ballot = Ballot::count(&self.classes, [(&sides, *walk)], self.threshold, self.clip);
+                let ballot =
+                    Ballot::count(&self.classes, [(&sides, *walk)], self.threshold, self.clip);
                 (self.classes[ballot.by_votes().0], image.label)
             };
-            (place, Accuracy::of(self.images.iter().zip(&member.displacements).map(answer)))
+            (
+                place,
+                Accuracy::of(self.images.iter().zip(&member.displacements).map(answer)),
+            )
         };
         // The first of several equal ones.
         self.members
             .iter()
             .enumerate()
             .map(alone)
-            .reduce(|best, next| if next.1.right > best.1.right { next } else { best })
+            .reduce(|best, next| {
+                if next.1.right > best.1.right {
+                    next
+                } else {
+                    best
+                }
+            })
     }
 }
 
@@ -219,7 +276,10 @@ mod tests {
     use super::*;
 
     fn sides(left: &[u8], right: &[u8]) -> Readout {
-        Readout { left: left.to_vec(), right: right.to_vec() }
+        Readout {
+            left: left.to_vec(),
+            right: right.to_vec(),
+        }
     }
 
     fn count(walks: &[(&Readout, Option<f64>)]) -> Ballot {
@@ -247,10 +307,19 @@ mod tests {
     fn a_tie_goes_to_the_larger_sum_of_walks_among_the_tied_and_then_to_the_lower_class() {
         let (a, b) = (sides(&[0], &[1]), sides(&[2], &[1]));
         // One vote each for 0 and 2; the walk towards 2 is longer.
-        assert_eq!(count(&[(&a, Some(-4.0)), (&b, Some(-6.0))]).by_votes(), (2, true));
-        assert_eq!(count(&[(&a, Some(-4.0)), (&b, Some(-4.0))]).by_votes(), (0, true));
+        assert_eq!(
+            count(&[(&a, Some(-4.0)), (&b, Some(-6.0))]).by_votes(),
+            (2, true)
+        );
+        assert_eq!(
+            count(&[(&a, Some(-4.0)), (&b, Some(-4.0))]).by_votes(),
+            (0, true)
+        );
         // Without votes all classes tie, and sums decide.
-        assert_eq!(count(&[(&a, Some(2.0)), (&b, Some(1.0))]).by_votes(), (1, true));
+        assert_eq!(
+            count(&[(&a, Some(2.0)), (&b, Some(1.0))]).by_votes(),
+            (1, true)
+        );
         assert_eq!(count(&[]).by_votes(), (0, true));
     }
 

@@ -75,7 +75,10 @@ mod tests {
         while thread_time() - begin < waited + Duration::from_millis(20) {
             sum = std::hint::black_box(sum.sqrt() + 1.0);
         }
-        assert!(wall.elapsed() >= Duration::from_millis(19), "no more than what passed");
+        assert!(
+            wall.elapsed() >= Duration::from_millis(19),
+            "no more than what passed"
+        );
         if CLOCK == "processor" {
             assert!(waited < Duration::from_millis(50), "{waited:?}");
         }

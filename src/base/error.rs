@@ -70,7 +70,13 @@ pub struct Argument {
 
 impl Error {
     fn new(kind: ErrorKind, message: String) -> Self {
-        Error { kind, message: one_line(&message), argument: None, remedies: Vec::new(), key: None }
+        Error {
+            kind,
+            message: one_line(&message),
+            argument: None,
+            remedies: Vec::new(),
+            key: None,
+        }
     }
 
     /// Reports that a file from the user is wrong.
@@ -89,9 +95,16 @@ impl Error {
     }
 
     /// Reports that an argument of a command has an invalid value; `text` says what was expected.
-    pub(crate) fn argument(name: &'static str, value: impl fmt::Display, text: impl Into<String>) -> Self {
+    pub(crate) fn argument(
+        name: &'static str,
+        value: impl fmt::Display,
+        text: impl Into<String>,
+    ) -> Self {
         let value = Some(one_line(&value.to_string()));
-        Error { argument: Some(Argument { name, value }), ..Error::usage(text.into()) }
+        Error {
+            argument: Some(Argument { name, value }),
+            ..Error::usage(text.into())
+        }
     }
 
     /// Reports that the command line is wrong.
@@ -127,14 +140,20 @@ impl Error {
     /// Acts as [`Error::reading`], and adds a remedy if there is no such file.
     pub(crate) fn reading_or(path: &Path, error: &io::Error, remedy: Remedy) -> Self {
         let text = Error::reading(path, error);
-        if error.kind() == io::ErrorKind::NotFound { text.remedy(remedy) } else { text }
+        if error.kind() == io::ErrorKind::NotFound {
+            text.remedy(remedy)
+        } else {
+            text
+        }
     }
 
     /// Reports that a file is not written because its folder is no longer this process's.
     fn lost(path: &Path, lost: &Lost) -> Self {
         let advice = match lost {
             Lost::Taken { .. } => "let that one end, or start this command again in another folder",
-            Lost::Removed { .. } => "start the command again, and leave the folder to it as long as it runs",
+            Lost::Removed { .. } => {
+                "start the command again, and leave the folder to it as long as it runs"
+            }
         };
         let text = format!("{}: not written: {lost}", path.display());
         Error::new(ErrorKind::Lost, text).advice(advice)
@@ -145,7 +164,11 @@ impl Error {
     pub(crate) fn writing(path: &Path, error: &io::Error) -> Self {
         // A folder removed a moment ago fails in other ways, too.
         let now = ownership::check(path).err();
-        if let Some(lost) = [Some(error), now.as_ref()].into_iter().flatten().find_map(Lost::of) {
+        if let Some(lost) = [Some(error), now.as_ref()]
+            .into_iter()
+            .flatten()
+            .find_map(Lost::of)
+        {
             return Error::lost(path, lost);
         }
         let place = match path.parent() {
@@ -154,12 +177,12 @@ impl Error {
         };
         let text = Error::other(format!("{}: cannot be written: {error}", path.display()));
         match error.kind() {
-            io::ErrorKind::FileTooLarge => {
-                text.advice("raise the limit for the size of files (ulimit -f)").remedy(Remedy::ChooseOut)
-            }
-            _ if is_full(error) => {
-                text.remedy(Remedy::FreeSpace(place.to_path_buf())).remedy(Remedy::ChooseOut)
-            }
+            io::ErrorKind::FileTooLarge => text
+                .advice("raise the limit for the size of files (ulimit -f)")
+                .remedy(Remedy::ChooseOut),
+            _ if is_full(error) => text
+                .remedy(Remedy::FreeSpace(place.to_path_buf()))
+                .remedy(Remedy::ChooseOut),
             _ => text,
         }
     }
@@ -183,20 +206,29 @@ impl Error {
     /// Names the argument that the error is about.
     #[must_use]
     pub(crate) fn about(self, name: &'static str) -> Self {
-        Error { argument: Some(Argument { name, value: None }), ..self }
+        Error {
+            argument: Some(Argument { name, value: None }),
+            ..self
+        }
     }
 
     /// Names the key that the error is about.
     #[must_use]
     pub(crate) fn with_key(self, key: &str) -> Self {
-        Error { key: Some(key.to_string()), ..self }
+        Error {
+            key: Some(key.to_string()),
+            ..self
+        }
     }
 
     /// Adds the place to the message unless it begins with it.
     #[must_use]
     pub fn in_place(mut self, place: &str) -> Self {
         let place = one_line(place);
-        let is_said = self.message.strip_prefix(&place).is_some_and(|rest| rest.starts_with(':'));
+        let is_said = self
+            .message
+            .strip_prefix(&place)
+            .is_some_and(|rest| rest.starts_with(':'));
         if !is_said {
             self.message = one_line(&format!("{place}: {}", self.message));
         }
@@ -220,7 +252,10 @@ impl From<Stopped> for Error {
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.argument {
-            Some(Argument { name, value: Some(value) }) => write!(f, "{name} {value}: {}", self.message),
+            Some(Argument {
+                name,
+                value: Some(value),
+            }) => write!(f, "{name} {value}: {}", self.message),
             Some(Argument { name, value: None }) => write!(f, "{name}: {}", self.message),
             None => f.write_str(&self.message),
         }

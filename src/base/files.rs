@@ -95,7 +95,10 @@ pub(crate) fn read_limited(source: impl Read) -> io::Result<String> {
     let mut bytes = Vec::new();
     let read = source.take(MOST_TEXT + 1).read_to_end(&mut bytes)?;
     if read as u64 > MOST_TEXT {
-        return Err(io::Error::new(io::ErrorKind::FileTooLarge, "expected at most 256 MB of text"));
+        return Err(io::Error::new(
+            io::ErrorKind::FileTooLarge,
+            "expected at most 256 MB of text",
+        ));
     }
     let text = match bytes.as_slice() {
         [0xff, 0xfe, rest @ ..] => utf16(rest, u16::from_le_bytes),
@@ -107,7 +110,9 @@ pub(crate) fn read_limited(source: impl Read) -> io::Result<String> {
 
 fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Option<String> {
     let (pairs, rest) = bytes.as_chunks::<2>();
-    let text: Option<String> = char::decode_utf16(pairs.iter().copied().map(unit)).map(Result::ok).collect();
+    let text: Option<String> = char::decode_utf16(pairs.iter().copied().map(unit))
+        .map(Result::ok)
+        .collect();
     text.filter(|_| rest.is_empty())
 }
 
@@ -134,7 +139,10 @@ pub(crate) fn write_atomically(path: &Path, content: &[u8]) -> io::Result<()> {
 ///
 /// # Errors
 /// As [`write_atomically`]; also the error of `write`.
-pub(crate) fn write_whole(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
+pub(crate) fn write_whole(
+    path: &Path,
+    write: impl FnOnce(&mut File) -> io::Result<()>,
+) -> io::Result<()> {
     // A rename would replace a device or a link by an ordinary file.
     if std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
         return write(&mut File::options().write(true).open(path)?);
@@ -162,12 +170,17 @@ fn temporary(path: &Path) -> io::Result<tempfile::NamedTempFile<File>> {
     // Opened here for two reasons: it gets the permissions of any new file, not a temporary file's
     // owner-only ones; and the system's error does not name a file that the user never mentioned.
     let open = |name: &Path| File::options().write(true).create_new(true).open(name);
-    tempfile::Builder::new().prefix(&prefix).suffix(TEMPORARY[1]).make_in(folder_of(path), open)
+    tempfile::Builder::new()
+        .prefix(&prefix)
+        .suffix(TEMPORARY[1])
+        .make_in(folder_of(path), open)
 }
 
 /// Returns the part of a file's name used in temporary names: names have at most 255 bytes.
 fn inner_name(path: &Path) -> &OsStr {
-    path.file_name().filter(|name| name.len() <= 200).unwrap_or_default()
+    path.file_name()
+        .filter(|name| name.len() <= 200)
+        .unwrap_or_default()
 }
 
 /// Returns the name of the file that a temporary name belongs to.
@@ -184,7 +197,8 @@ fn remove_left_behind(path: &Path) {
         return;
     };
     for entry in entries.flatten() {
-        let is_own = temporary_of(&entry.file_name().to_string_lossy()).is_some_and(|name| name == own);
+        let is_own =
+            temporary_of(&entry.file_name().to_string_lossy()).is_some_and(|name| name == own);
         if is_own && is_left_behind(&entry).unwrap_or(false) {
             let _ = std::fs::remove_file(entry.path());
         }
@@ -195,7 +209,9 @@ fn remove_left_behind(path: &Path) {
 /// file may not be locked yet.
 fn is_left_behind(entry: &DirEntry) -> io::Result<bool> {
     let found = entry.metadata()?;
-    let age = SystemTime::now().duration_since(found.modified()?).unwrap_or_default();
+    let age = SystemTime::now()
+        .duration_since(found.modified()?)
+        .unwrap_or_default();
     // Only files can be leftovers, and network file systems lock only files open for writing.
     let opened = || File::options().write(true).open(entry.path());
     Ok(found.is_file() && age > TO_LOCK && opened()?.try_lock().is_ok())
@@ -204,7 +220,9 @@ fn is_left_behind(entry: &DirEntry) -> io::Result<bool> {
 /// Returns the target of a path, even if it is a symbolic link to a file that does not exist yet.
 fn led_to(path: &Path) -> PathBuf {
     let beside = |link: PathBuf| path.with_file_name(link);
-    path.canonicalize().or_else(|_| path.read_link().map(beside)).unwrap_or_else(|_| path.to_path_buf())
+    path.canonicalize()
+        .or_else(|_| path.read_link().map(beside))
+        .unwrap_or_else(|_| path.to_path_buf())
 }
 
 /// Checks that [`write_atomically`] could write here; leaves nothing behind.
@@ -227,7 +245,9 @@ pub(crate) fn check_writable(path: &Path) -> io::Result<()> {
 pub(crate) fn remove_half_written(folder: &Path, names: &[&str]) -> io::Result<()> {
     for entry in std::fs::read_dir(folder)? {
         let entry = entry?;
-        if temporary_of(&entry.file_name().to_string_lossy()).is_some_and(|name| names.contains(&name)) {
+        if temporary_of(&entry.file_name().to_string_lossy())
+            .is_some_and(|name| names.contains(&name))
+        {
             std::fs::remove_file(entry.path())?;
         }
     }
@@ -239,7 +259,11 @@ pub(crate) fn remove_half_written(folder: &Path, names: &[&str]) -> io::Result<(
 /// # Errors
 /// Returns the system's error.
 pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
-    if cfg!(unix) { File::open(folder)?.sync_all() } else { Ok(()) }
+    if cfg!(unix) {
+        File::open(folder)?.sync_all()
+    } else {
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -275,10 +299,19 @@ mod tests {
         let file = folder.path().join("file");
         std::fs::write(&file, b"").unwrap();
         for path in [nowhere, file.join("eval.json")] {
-            for error in [write_atomically(&path, b"{}").unwrap_err(), check_writable(&path).unwrap_err()] {
+            for error in [
+                write_atomically(&path, b"{}").unwrap_err(),
+                check_writable(&path).unwrap_err(),
+            ] {
                 let text = error.to_string();
-                assert!(!text.contains("tmp") && !text.contains("none") && !text.contains("path"), "{text}");
-                assert!(error.raw_os_error().is_some(), "what the system says: {text}");
+                assert!(
+                    !text.contains("tmp") && !text.contains("none") && !text.contains("path"),
+                    "{text}"
+                );
+                assert!(
+                    error.raw_os_error().is_some(),
+                    "what the system says: {text}"
+                );
             }
         }
     }
@@ -311,7 +344,10 @@ mod tests {
         let link = folder.path().join("later.json");
         std::os::unix::fs::symlink("scratch/later.json", &link).unwrap();
         write_atomically(&link, b"later").unwrap();
-        assert_eq!(std::fs::read(folder.path().join("scratch/later.json")).unwrap(), b"later");
+        assert_eq!(
+            std::fs::read(folder.path().join("scratch/later.json")).unwrap(),
+            b"later"
+        );
         assert!(link.symlink_metadata().unwrap().is_symlink());
     }
 
@@ -321,7 +357,13 @@ mod tests {
         use std::os::unix::fs::FileTypeExt;
         let folder = tempfile::tempdir().unwrap();
         let pipe = folder.path().join("pipe");
-        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        assert!(
+            std::process::Command::new("mkfifo")
+                .arg(&pipe)
+                .status()
+                .unwrap()
+                .success()
+        );
         let reader = std::thread::spawn({
             let pipe = pipe.clone();
             move || std::fs::read(pipe).unwrap()
@@ -336,7 +378,13 @@ mod tests {
     fn a_pipe_or_a_device_is_no_file_of_a_run_and_is_refused_without_waiting_for_it() {
         let folder = tempfile::tempdir().unwrap();
         let pipe = folder.path().join("run.json");
-        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        assert!(
+            std::process::Command::new("mkfifo")
+                .arg(&pipe)
+                .status()
+                .unwrap()
+                .success()
+        );
         let link = folder.path().join("link.json");
         std::os::unix::fs::symlink("/dev/zero", &link).unwrap();
         for path in [&pipe, &link] {
@@ -345,11 +393,17 @@ mod tests {
             }
         }
         // A folder gives the system's error; a link to a file opens that file.
-        assert_eq!(read_text(folder.path()).unwrap_err().kind(), io::ErrorKind::IsADirectory);
+        assert_eq!(
+            read_text(folder.path()).unwrap_err().kind(),
+            io::ErrorKind::IsADirectory
+        );
         std::fs::write(folder.path().join("file"), "text").unwrap();
         std::fs::remove_file(&link).unwrap();
         std::os::unix::fs::symlink("file", &link).unwrap();
-        assert_eq!((read_text(&link).unwrap(), read_bytes(&link).unwrap()), ("text".into(), b"text".into()));
+        assert_eq!(
+            (read_text(&link).unwrap(), read_bytes(&link).unwrap()),
+            ("text".into(), b"text".into())
+        );
     }
 
     #[cfg(unix)]
@@ -357,7 +411,13 @@ mod tests {
     fn what_the_user_names_may_come_through_a_pipe() {
         let folder = tempfile::tempdir().unwrap();
         let pipe = folder.path().join("config.toml");
-        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        assert!(
+            std::process::Command::new("mkfifo")
+                .arg(&pipe)
+                .status()
+                .unwrap()
+                .success()
+        );
         let writer = std::thread::spawn({
             let pipe = pipe.clone();
             move || std::fs::write(pipe, "seed = 1").unwrap()
@@ -367,7 +427,8 @@ mod tests {
     }
 
     #[test]
-    fn what_a_killed_process_left_of_a_file_goes_when_it_is_written_and_what_is_being_written_stays() {
+    fn what_a_killed_process_left_of_a_file_goes_when_it_is_written_and_what_is_being_written_stays()
+     {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("audit.json");
         let long_ago = SystemTime::now() - Duration::from_secs(3600);
@@ -381,8 +442,15 @@ mod tests {
         drop(made(".audit.json.dead.tmp", true));
         let alive = made(".audit.json.alive.tmp", true);
         alive.lock().unwrap();
-        let others = [".audit.json.fresh.tmp", ".audit.csv.Xy1.tmp", "audit.json.tmp", ".audit.json"];
-        others.iter().for_each(|name| drop(made(name, name.contains("csv"))));
+        let others = [
+            ".audit.json.fresh.tmp",
+            ".audit.csv.Xy1.tmp",
+            "audit.json.tmp",
+            ".audit.json",
+        ];
+        others
+            .iter()
+            .for_each(|name| drop(made(name, name.contains("csv"))));
         write_atomically(&path, b"{}").unwrap();
         let is_there = |name: &str| folder.path().join(name).exists();
         assert!(!is_there(".audit.json.dead.tmp"));
@@ -390,15 +458,28 @@ mod tests {
         drop(alive);
         write_atomically(&path, b"{}").unwrap();
         assert!(!is_there(".audit.json.alive.tmp"));
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1 + others.len());
+        assert_eq!(
+            std::fs::read_dir(folder.path()).unwrap().count(),
+            1 + others.len()
+        );
     }
 
     #[test]
     fn only_half_written_files_of_these_names_are_removed() {
         let folder = tempfile::tempdir().unwrap();
-        let kept =
-            ["run.json", ".lock", ".eval.json.Ab1.tmp", ".hidden", "run.json.tmp", ".run.json", ".tmp"];
-        for name in kept.iter().chain(&[".run.json.Xy2zz.tmp", ".elites.csv.q.tmp"]) {
+        let kept = [
+            "run.json",
+            ".lock",
+            ".eval.json.Ab1.tmp",
+            ".hidden",
+            "run.json.tmp",
+            ".run.json",
+            ".tmp",
+        ];
+        for name in kept
+            .iter()
+            .chain(&[".run.json.Xy2zz.tmp", ".elites.csv.q.tmp"])
+        {
             std::fs::write(folder.path().join(name), b"").unwrap();
         }
         remove_half_written(folder.path(), &["run.json", "elites.csv"]).unwrap();

@@ -28,7 +28,11 @@ pub(crate) fn explained(r_squared: f64) -> String {
 
 fn unsigned_zero(text: String) -> String {
     let is_zero = text.chars().all(|c| matches!(c, '+' | '-' | '0' | '.'));
-    if is_zero { text.trim_start_matches(['+', '-']).to_string() } else { text }
+    if is_zero {
+        text.trim_start_matches(['+', '-']).to_string()
+    } else {
+        text
+    }
 }
 
 #[cfg(test)]
@@ -37,20 +41,35 @@ mod tests {
 
     #[test]
     fn nothing_explains_less_than_nothing() {
-        assert_eq!([-1.03, -0.0, 0.874, 1.0].map(explained), ["0", "0", "87", "100"]);
+        assert_eq!(
+            [-1.03, -0.0, 0.874, 1.0].map(explained),
+            ["0", "0", "87", "100"]
+        );
     }
 
     #[test]
     fn what_rounds_to_nothing_has_no_sign() {
         for value in [-0.0, 0.0, -0.004, 0.004, -f64::MIN_POSITIVE] {
-            assert_eq!((fixed(value, 2), signed(value, 2)), ("0.00".to_string(), "0.00".to_string()));
+            assert_eq!(
+                (fixed(value, 2), signed(value, 2)),
+                ("0.00".to_string(), "0.00".to_string())
+            );
         }
         assert_eq!(
             (fixed(-0.4, 0), signed(-0.4, 0), percent(-0.0004)),
             ("0".into(), "0".into(), "0.0".into())
         );
-        assert_eq!((fixed(-0.006, 2), signed(-0.006, 2)), ("-0.01".to_string(), "-0.01".to_string()));
-        assert_eq!((fixed(1.25, 1), signed(1.26, 1)), ("1.2".to_string(), "+1.3".to_string()));
-        assert_eq!((fixed(f64::NAN, 2), signed(-f64::INFINITY, 1)), ("NaN".to_string(), "-inf".to_string()));
+        assert_eq!(
+            (fixed(-0.006, 2), signed(-0.006, 2)),
+            ("-0.01".to_string(), "-0.01".to_string())
+        );
+        assert_eq!(
+            (fixed(1.25, 1), signed(1.26, 1)),
+            ("1.2".to_string(), "+1.3".to_string())
+        );
+        assert_eq!(
+            (fixed(f64::NAN, 2), signed(-f64::INFINITY, 1)),
+            ("NaN".to_string(), "-inf".to_string())
+        );
     }
 }

@@ -42,7 +42,12 @@ pub struct Work {
 impl Work {
     /// Makes work of which nothing was done before.
     pub(crate) fn new(label: String, total: u64, unit: &'static str) -> Self {
-        Work { label, total, known: 0, unit }
+        Work {
+            label,
+            total,
+            known: 0,
+            unit,
+        }
     }
 }
 

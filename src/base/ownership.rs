@@ -60,10 +60,17 @@ pub(crate) struct Ownership(u64);
 impl Ownership {
     /// Claims the folder of a lock. Before this process writes a file there, it calls `look`, which
     /// fails if it no longer may.
-    pub(crate) fn claim(lock: &Path, look: impl Fn() -> io::Result<()> + Send + Sync + 'static) -> Self {
+    pub(crate) fn claim(
+        lock: &Path,
+        look: impl Fn() -> io::Result<()> + Send + Sync + 'static,
+    ) -> Self {
         static NEXT: AtomicU64 = AtomicU64::new(0);
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
-        claims().push(Claim { number, places: places(folder_of(lock)), look: Arc::new(look) });
+        claims().push(Claim {
+            number,
+            places: places(folder_of(lock)),
+            look: Arc::new(look),
+        });
         Ownership(number)
     }
 }
@@ -84,19 +91,27 @@ pub(crate) fn check(file: &Path) -> io::Result<()> {
     }
     let places = places(folder_of(file));
     let is_there = |claim: &&Claim| claim.places.iter().any(|place| places.contains(place));
-    let looks: Vec<Arc<Look>> =
-        claims().iter().filter(is_there).map(|claim| Arc::clone(&claim.look)).collect();
+    let looks: Vec<Arc<Look>> = claims()
+        .iter()
+        .filter(is_there)
+        .map(|claim| Arc::clone(&claim.look))
+        .collect();
     looks.iter().try_for_each(|look| look())
 }
 
 /// Returns the folder of a file.
 pub(super) fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+    path.parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+        .unwrap_or(Path::new("."))
 }
 
 /// Returns the paths of a folder by which it is found again, even after it was removed.
 fn places(folder: &Path) -> Vec<PathBuf> {
-    [std::path::absolute(folder), folder.canonicalize()].into_iter().flatten().collect()
+    [std::path::absolute(folder), folder.canonicalize()]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 #[cfg(test)]
@@ -109,7 +124,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let own = folder.path().join("own");
         std::fs::create_dir_all(own.join("inner")).unwrap();
-        let lost = || Lost::Removed { lock: "own/.lock".into() };
+        let lost = || Lost::Removed {
+            lock: "own/.lock".into(),
+        };
         let ownership = Ownership::claim(&own.join(".lock"), move || Err(lost().into()));
         for name in ["own/run.json", "own/inner/../run.json", "own/./run.json"] {
             let error = write_atomically(&folder.path().join(name), b"{}").unwrap_err();

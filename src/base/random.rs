@@ -118,16 +118,31 @@ mod tests {
         // Pinned: a change here changes every result of every seed (CHANGELOG:
         // Reproducibility-breaking).
         let mut s = stream(1, Purpose::Mutation, 2, 3);
-        let drawn = (s.0.next_u64(), s.below(1000), s.unit().to_bits(), s.normal().to_bits());
+        let drawn = (
+            s.0.next_u64(),
+            s.below(1000),
+            s.unit().to_bits(),
+            s.normal().to_bits(),
+        );
         assert_eq!(drawn, PINNED);
     }
-    const PINNED: (u64, usize, u64, u64) =
-        (17448176558777177843, 198, 4602931794695820294, 4607381470957426693);
+    const PINNED: (u64, usize, u64, u64) = (
+        17448176558777177843,
+        198,
+        4602931794695820294,
+        4607381470957426693,
+    );
 
     #[test]
     fn streams_of_neighbouring_names_are_unrelated() {
-        let first = |seed, generation, child| stream(seed, Purpose::Parents, generation, child).0.next_u64();
-        let mut seen: Vec<u64> = (0..1000).map(|i| first(i % 10, i / 10 % 10, i / 100)).collect();
+        let first = |seed, generation, child| {
+            stream(seed, Purpose::Parents, generation, child)
+                .0
+                .next_u64()
+        };
+        let mut seen: Vec<u64> = (0..1000)
+            .map(|i| first(i % 10, i / 10 % 10, i / 100))
+            .collect();
         seen.sort_unstable();
         seen.dedup();
         assert_eq!(seen.len(), 1000);
@@ -152,6 +167,9 @@ mod tests {
         let draws: Vec<f64> = (0..100_000).map(|_| s.normal()).collect();
         let mean = draws.iter().sum::<f64>() / 1e5;
         let variance = draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 1e5;
-        assert!(mean.abs() < 0.02 && (variance - 1.0).abs() < 0.03, "{mean} {variance}");
+        assert!(
+            mean.abs() < 0.02 && (variance - 1.0).abs() < 0.03,
+            "{mean} {variance}"
+        );
     }
 }

@@ -58,7 +58,9 @@ pub(crate) fn share<'de, D: Deserializer<'de>, T: Numbers + Deserialize<'de>>(
 }
 
 /// Reads numbers that are not negative.
-pub(crate) fn size<'de, D: Deserializer<'de>, T: Numbers + Deserialize<'de>>(from: D) -> Result<T, D::Error> {
+pub(crate) fn size<'de, D: Deserializer<'de>, T: Numbers + Deserialize<'de>>(
+    from: D,
+) -> Result<T, D::Error> {
     read(from, SIZE)
 }
 
@@ -95,9 +97,9 @@ where
 {
     let found: T = read(from, range)?;
     match found.clone().into() {
-        Some([low, high]) if low > high => {
-            Err(serde::de::Error::custom(format!("expected the lower end first, found [{low}, {high}]")))
-        }
+        Some([low, high]) if low > high => Err(serde::de::Error::custom(format!(
+            "expected the lower end first, found [{low}, {high}]"
+        ))),
         _ => Ok(found),
     }
 }
@@ -131,7 +133,11 @@ fn refusal(number: f64, range: &RangeInclusive<f64>) -> String {
 
 /// Formats a number in few characters, however large it is.
 fn short(number: f64) -> String {
-    if number.abs() < 1e6 { number.to_string() } else { format!("{number:e}") }
+    if number.abs() < 1e6 {
+        number.to_string()
+    } else {
+        format!("{number:e}")
+    }
 }
 
 #[cfg(test)]
@@ -153,13 +159,33 @@ mod tests {
 
     #[test]
     fn numbers_outside_their_range_are_refused_with_the_range_and_what_was_found() {
-        let error = |text: &str| serde_json::from_str::<File>(text).map(drop).unwrap_err().to_string();
+        let error = |text: &str| {
+            serde_json::from_str::<File>(text)
+                .map(drop)
+                .unwrap_err()
+                .to_string()
+        };
         for (text, expected) in [
-            (r#"{"shares": {"3": 0.5, "4": 7.5}}"#, "expected a number from 0 to 1, found 7.5"),
-            (r#"{"sizes": [1, null, -2]}"#, "expected a number from 0 to 1e50, found -2"),
-            (r#"{"number": -1e308}"#, "expected a number from -1e50 to 1e50, found -1e308"),
-            (r#"{"interval": [5, -3]}"#, "expected a number from 0 to 1, found 5"),
-            (r#"{"interval": [0.5, 0.25]}"#, "expected the lower end first, found [0.5, 0.25]"),
+            (
+                r#"{"shares": {"3": 0.5, "4": 7.5}}"#,
+                "expected a number from 0 to 1, found 7.5",
+            ),
+            (
+                r#"{"sizes": [1, null, -2]}"#,
+                "expected a number from 0 to 1e50, found -2",
+            ),
+            (
+                r#"{"number": -1e308}"#,
+                "expected a number from -1e50 to 1e50, found -1e308",
+            ),
+            (
+                r#"{"interval": [5, -3]}"#,
+                "expected a number from 0 to 1, found 5",
+            ),
+            (
+                r#"{"interval": [0.5, 0.25]}"#,
+                "expected the lower end first, found [0.5, 0.25]",
+            ),
         ] {
             assert!(error(text).contains(expected), "{text}: {}", error(text));
         }
@@ -171,6 +197,9 @@ mod tests {
             assert!(serde_json::from_str::<File>(text).is_ok(), "{text}");
         }
         assert!(check("a.b", -0.5).is_ok());
-        assert_eq!(check("a.b", f64::NAN).unwrap_err().key.as_deref(), Some("a.b"));
+        assert_eq!(
+            check("a.b", f64::NAN).unwrap_err().key.as_deref(),
+            Some("a.b")
+        );
     }
 }

@@ -35,8 +35,9 @@ impl Ranks {
     /// Returns an error if MPI cannot be used, or if it started several processes of a program
     /// built without it, which would all do the same work.
     pub fn join() -> Result<(Ranks, Guard), Error> {
-        let launched =
-            LAUNCHED.iter().find_map(|name| std::env::var(name).ok()?.trim().parse::<usize>().ok());
+        let launched = LAUNCHED
+            .iter()
+            .find_map(|name| std::env::var(name).ok()?.trim().parse::<usize>().ok());
         join(launched)
     }
 
@@ -70,7 +71,9 @@ impl Ranks {
             return vec![own];
         }
         let all = gather(&serde_json::to_vec(&own).expect(WHY));
-        all.iter().map(|bytes| serde_json::from_slice(bytes).expect(WHY)).collect()
+        all.iter()
+            .map(|bytes| serde_json::from_slice(bytes).expect(WHY))
+            .collect()
     }
 
     /// Divides jobs among the ranks by size. Each rank does its own with `work` and receives all
@@ -137,17 +140,28 @@ mod world {
     pub(super) fn join(_launched: Option<usize>) -> Result<(Ranks, Guard), Error> {
         // One thread at a time calls MPI, but not always the first one.
         let Some((universe, _)) = mpi::initialize_with_threading(Threading::Serialized) else {
-            return Err(Error::other("MPI cannot be used: it was initialised before".to_string()));
+            return Err(Error::other(
+                "MPI cannot be used: it was initialised before".to_string(),
+            ));
         };
         let world = universe.world();
         let number = |number: i32| usize::try_from(number).expect("ranks are counted from 0");
-        let ranks = Ranks { rank: number(world.rank()), size: number(world.size()) };
-        Ok((ranks, Guard { _universe: Some(universe) }))
+        let ranks = Ranks {
+            rank: number(world.rank()),
+            size: number(world.size()),
+        };
+        Ok((
+            ranks,
+            Guard {
+                _universe: Some(universe),
+            },
+        ))
     }
 
     pub(super) fn gather(own: &[u8]) -> Vec<Vec<u8>> {
         let world = SimpleCommunicator::world();
-        let length = i32::try_from(own.len()).expect("what ranks exchange is far below two gigabytes");
+        let length =
+            i32::try_from(own.len()).expect("what ranks exchange is far below two gigabytes");
         let size = usize::try_from(world.size()).expect("ranks are counted from 0");
         let mut lengths = vec![0_i32; size];
         world.all_gather_into(&length, &mut lengths[..]);
@@ -166,8 +180,9 @@ mod world {
             let mut parts = PartitionMut::new(&mut all[..], &lengths[..], &starts[..]);
             world.all_gather_varcount_into(own, &mut parts);
         }
-        let part =
-            |(start, length): (&i32, &i32)| all[place(*start)..place(*start) + place(*length)].to_vec();
+        let part = |(start, length): (&i32, &i32)| {
+            all[place(*start)..place(*start) + place(*length)].to_vec()
+        };
         starts.iter().zip(&lengths).map(part).collect()
     }
 
@@ -183,7 +198,8 @@ mod world {
     pub(super) fn join(launched: Option<usize>) -> Result<(Ranks, Guard), Error> {
         match launched {
             Some(size) if size > 1 => {
-                let text = format!("MPI started {size} processes, and this morphcog is built without MPI");
+                let text =
+                    format!("MPI started {size} processes, and this morphcog is built without MPI");
                 let error = Error::usage(text).advice("build it with the feature mpi");
                 Err(error.advice("start it once"))
             }
@@ -209,7 +225,11 @@ mod tests {
     #[test]
     fn the_largest_pieces_go_first_and_every_rank_has_about_as_much() {
         assert_eq!(owners(&[1, 9, 5, 5, 4], 3), [2, 0, 1, 2, 1]);
-        assert_eq!(owners(&[0, 0, 0, 0], 3), [0, 1, 2, 0], "what weighs nothing is divided, too");
+        assert_eq!(
+            owners(&[0, 0, 0, 0], 3),
+            [0, 1, 2, 0],
+            "what weighs nothing is divided, too"
+        );
         assert_eq!(Ranks::ALONE.owners(&[3, 1]), [0, 0]);
         assert_eq!(owners(&[], 3), Vec::<usize>::new());
     }

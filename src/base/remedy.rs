@@ -86,7 +86,11 @@ pub(crate) enum Value {
 impl Invocation {
     /// Makes a command without options.
     pub(crate) fn new(command: &'static str) -> Self {
-        Invocation { command, values: Vec::new(), options: Vec::new() }
+        Invocation {
+            command,
+            values: Vec::new(),
+            options: Vec::new(),
+        }
     }
 
     /// Adds a value without an option.

@@ -35,13 +35,24 @@ impl<'a> Session<'a> {
     /// Returns a session of this process alone, with one thread per core.
     pub fn new(stop: &'a AtomicBool, observer: &'a dyn Observer) -> Self {
         let (ranks, pool) = (Ranks::ALONE, OnceLock::new());
-        Session { threads: None, ranks, stop, observer, data: None, pool }
+        Session {
+            threads: None,
+            ranks,
+            stop,
+            observer,
+            data: None,
+            pool,
+        }
     }
 
     /// Returns a session with another number of threads.
     #[must_use]
     pub fn threads(self, threads: Option<usize>) -> Self {
-        Session { threads, pool: OnceLock::new(), ..self }
+        Session {
+            threads,
+            pool: OnceLock::new(),
+            ..self
+        }
     }
 
     /// Returns a session whose work several processes share.
@@ -61,7 +72,10 @@ impl<'a> Session<'a> {
     where
         'a: 'b,
     {
-        Session::new(self.stop, observer).threads(self.threads).ranks(self.ranks).data(self.data.clone())
+        Session::new(self.stop, observer)
+            .threads(self.threads)
+            .ranks(self.ranks)
+            .data(self.data.clone())
     }
 
     /// Returns the images' folder that the user names.

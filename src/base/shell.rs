@@ -24,7 +24,12 @@ pub(crate) fn quoted(word: impl AsRef<OsStr>) -> String {
 }
 
 fn escaped(bytes: &[u8]) -> String {
-    let octal = |bytes: &[u8]| bytes.iter().map(|byte| format!("\\{byte:03o}")).collect::<String>();
+    let octal = |bytes: &[u8]| {
+        bytes
+            .iter()
+            .map(|byte| format!("\\{byte:03o}"))
+            .collect::<String>()
+    };
     let seen = |c: char| match is_unseen(c) || c == '\'' || c == '\\' {
         true => octal(c.encode_utf8(&mut [0; 4]).as_bytes()),
         false => c.to_string(),
@@ -67,7 +72,10 @@ mod tests {
         ];
         for word in words {
             let script = format!("printf %s {}", quoted(OsStr::from_bytes(word)));
-            match std::process::Command::new("bash").args(["-c", &script]).output() {
+            match std::process::Command::new("bash")
+                .args(["-c", &script])
+                .output()
+            {
                 Ok(output) => assert_eq!(output.stdout, word, "{script}"),
                 Err(_) => return,
             }

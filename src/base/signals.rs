@@ -65,7 +65,8 @@ pub(crate) fn heed_file_limit() {
 /// # Errors
 /// Returns an error if the system does not let signals be handled.
 pub(crate) fn stop_flag() -> Result<StopFlag, Error> {
-    let failed = |error: std::io::Error| Error::other(format!("signals cannot be handled: {error}"));
+    let failed =
+        |error: std::io::Error| Error::other(format!("signals cannot be handled: {error}"));
     let signals = stopping();
     let unused = match UNUSED.get() {
         Some(unused) => unused,
@@ -80,7 +81,8 @@ pub(crate) fn stop_flag() -> Result<StopFlag, Error> {
     let stop = Arc::new(AtomicBool::new(false));
     // In this order: the first SIGINT finds its flag unset and sets it, the second finds it set.
     let interrupted = Arc::new(AtomicBool::new(false));
-    flag::register_conditional_shutdown(SIGINT, AT_ONCE, Arc::clone(&interrupted)).map_err(failed)?;
+    flag::register_conditional_shutdown(SIGINT, AT_ONCE, Arc::clone(&interrupted))
+        .map_err(failed)?;
     flag::register(SIGINT, interrupted).map_err(failed)?;
     let by = Arc::new(AtomicUsize::new(0));
     for signal in signals {
@@ -89,7 +91,11 @@ pub(crate) fn stop_flag() -> Result<StopFlag, Error> {
         flag::register(signal, Arc::clone(&stop)).map_err(failed)?;
     }
     let were_unused = unused.swap(false, Ordering::Relaxed);
-    Ok(StopFlag { stop, signal: by, were_unused })
+    Ok(StopFlag {
+        stop,
+        signal: by,
+        were_unused,
+    })
 }
 
 /// Returns the signals that make a command stop.

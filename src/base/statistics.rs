@@ -14,8 +14,16 @@ pub(crate) fn wilson(right: usize, total: usize) -> [f64; 2] {
     let spread = Z * (share * (1.0 - share) / n + Z * Z / (4.0 * n * n)).sqrt();
     let scale = 1.0 + Z * Z / n;
     // With none or all right the bounds are exactly 0 and 1, which rounding would miss.
-    let low = if right == 0 { 0.0 } else { ((centre - spread) / scale).max(0.0) };
-    let high = if right == total { 1.0 } else { ((centre + spread) / scale).min(1.0) };
+    let low = if right == 0 {
+        0.0
+    } else {
+        ((centre - spread) / scale).max(0.0)
+    };
+    let high = if right == total {
+        1.0
+    } else {
+        ((centre + spread) / scale).min(1.0)
+    };
     [low, high]
 }
 
@@ -23,7 +31,10 @@ pub(crate) fn wilson(right: usize, total: usize) -> [f64; 2] {
 pub(crate) fn standard_deviation(values: &[f64]) -> Option<f64> {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
-    let squares = values.iter().map(|value| (value - mean) * (value - mean)).sum::<f64>();
+    let squares = values
+        .iter()
+        .map(|value| (value - mean) * (value - mean))
+        .sum::<f64>();
     (values.len() > 1).then(|| (squares / (n - 1.0)).sqrt())
 }
 
@@ -33,7 +44,10 @@ pub(crate) fn standard_deviation(values: &[f64]) -> Option<f64> {
 /// (Davison & Hinkley 1997, section 3.8). None for fewer than two values.
 pub(crate) fn bootstrap(clusters: &[Vec<f64>]) -> Option<[f64; 2]> {
     const RESAMPLES: usize = 10_000;
-    let clusters: Vec<&Vec<f64>> = clusters.iter().filter(|values| !values.is_empty()).collect();
+    let clusters: Vec<&Vec<f64>> = clusters
+        .iter()
+        .filter(|values| !values.is_empty())
+        .collect();
     if clusters.iter().map(|values| values.len()).sum::<usize>() < 2 {
         return None;
     }
@@ -42,16 +56,25 @@ pub(crate) fn bootstrap(clusters: &[Vec<f64>]) -> Option<[f64; 2]> {
         let (mut sum, mut count) = (0.0, 0);
         for _ in 0..clusters.len() {
             // A single cluster needs no draw.
-            let place = if clusters.len() == 1 { 0 } else { rng.below(clusters.len()) };
+            let place = if clusters.len() == 1 {
+                0
+            } else {
+                rng.below(clusters.len())
+            };
             let values = clusters[place];
-            sum += (0..values.len()).map(|_| values[rng.below(values.len())]).sum::<f64>();
+            sum += (0..values.len())
+                .map(|_| values[rng.below(values.len())])
+                .sum::<f64>();
             count += values.len();
         }
         sum / count as f64
     };
     let mut means: Vec<f64> = (0..RESAMPLES).map(&mut mean).collect();
     means.sort_by(f64::total_cmp);
-    Some([means[RESAMPLES * 25 / 1000], means[RESAMPLES * 975 / 1000 - 1]])
+    Some([
+        means[RESAMPLES * 25 / 1000],
+        means[RESAMPLES * 975 / 1000 - 1],
+    ])
 }
 
 #[cfg(test)]
@@ -66,9 +89,15 @@ mod tests {
         let values = [values.to_vec()];
         let [low, high] = bootstrap(&values).unwrap();
         // The normal approximation: 0.7 ± 1.96·0.1414/√5.
-        assert!((low - 0.576).abs() < 0.02 && (high - 0.824).abs() < 0.02, "{low} {high}");
+        assert!(
+            (low - 0.576).abs() < 0.02 && (high - 0.824).abs() < 0.02,
+            "{low} {high}"
+        );
         assert_eq!(bootstrap(&values), bootstrap(&values));
-        assert_eq!((standard_deviation(&[0.5]), bootstrap(&[vec![0.5]])), (None, None));
+        assert_eq!(
+            (standard_deviation(&[0.5]), bootstrap(&[vec![0.5]])),
+            (None, None)
+        );
     }
 
     #[test]
@@ -78,7 +107,9 @@ mod tests {
             high - low
         };
         // Clusters that differ, values that do not: as wide as one value of each.
-        let alike: Vec<Vec<f64>> = [0.5, 0.6, 0.7, 0.8, 0.9].map(|value| vec![value; 10]).to_vec();
+        let alike: Vec<Vec<f64>> = [0.5, 0.6, 0.7, 0.8, 0.9]
+            .map(|value| vec![value; 10])
+            .to_vec();
         let single: Vec<Vec<f64>> = [0.5, 0.6, 0.7, 0.8, 0.9].map(|value| vec![value]).to_vec();
         assert!((width(&alike) - width(&single)).abs() < 0.02);
         assert!(width(&alike) > 2.5 * width(&[alike.concat()]));
@@ -91,7 +122,10 @@ mod tests {
     fn the_wilson_interval_is_the_textbooks() {
         // 8 of 10: 0.4902 to 0.9433 (Brown, Cai & DasGupta 2001 use the same formula).
         let [low, high] = wilson(8, 10);
-        assert!((low - 0.4902).abs() < 5e-5 && (high - 0.9433).abs() < 5e-5, "{low} {high}");
+        assert!(
+            (low - 0.4902).abs() < 5e-5 && (high - 0.9433).abs() < 5e-5,
+            "{low} {high}"
+        );
         assert!(wilson(0, 50)[0] < 1e-15 && wilson(50, 50)[1] > 1.0 - 1e-15);
         assert_eq!(wilson(0, 0), [0.0, 1.0]);
     }

@@ -12,9 +12,12 @@ pub(crate) fn csv<R: Serialize>(
     rows: impl IntoIterator<Item = R>,
 ) -> Vec<u8> {
     const WHY: &str = "rows have a field for every column, and memory can be written to";
-    let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
+    let mut writer = csv::WriterBuilder::new()
+        .has_headers(false)
+        .from_writer(Vec::new());
     writer.write_record(columns).expect(WHY);
-    rows.into_iter().for_each(|row| writer.serialize(row).expect(WHY));
+    rows.into_iter()
+        .for_each(|row| writer.serialize(row).expect(WHY));
     writer.into_inner().expect(WHY)
 }
 
@@ -25,7 +28,9 @@ pub(crate) fn numbered(name: &str, count: usize) -> impl Iterator<Item = String>
 
 /// Pads a list with empty fields to the number of columns.
 pub(crate) fn padded(values: &[f64], columns: usize) -> Vec<Option<f64>> {
-    (0..columns).map(|column| values.get(column).copied()).collect()
+    (0..columns)
+        .map(|column| values.get(column).copied())
+        .collect()
 }
 
 #[cfg(test)]
@@ -34,9 +39,18 @@ mod tests {
 
     #[test]
     fn a_row_of_names_numbers_and_lists_is_a_line_that_other_programs_read() {
-        let columns = ["id", "none"].map(str::to_string).into_iter().chain(numbered("walk", 2));
-        let rows = [("a,b", None::<u8>, padded(&[1.5], 2)), ("c", Some(7), padded(&[0.1 + 0.2, -0.0], 2))];
+        let columns = ["id", "none"]
+            .map(str::to_string)
+            .into_iter()
+            .chain(numbered("walk", 2));
+        let rows = [
+            ("a,b", None::<u8>, padded(&[1.5], 2)),
+            ("c", Some(7), padded(&[0.1 + 0.2, -0.0], 2)),
+        ];
         let text = String::from_utf8(csv(columns, rows)).unwrap();
-        assert_eq!(text, "id,none,walk_0,walk_1\n\"a,b\",,1.5,\nc,7,0.30000000000000004,-0.0\n");
+        assert_eq!(
+            text,
+            "id,none,walk_0,walk_1\n\"a,b\",,1.5,\nc,7,0.30000000000000004,-0.0\n"
+        );
     }
 }

@@ -27,14 +27,23 @@ pub(crate) fn shortened(text: &str, most: usize) -> String {
     let half = most / 2;
     let mut last: Vec<char> = text.chars().rev().take(half).collect();
     last.reverse();
-    let last: Vec<char> = last.into_iter().map(written).collect::<String>().chars().collect();
+    let last: Vec<char> = last
+        .into_iter()
+        .map(written)
+        .collect::<String>()
+        .chars()
+        .collect();
     let begin: String = begin.chars().take(half).collect();
     let end: String = last[last.len().saturating_sub(half)..].iter().collect();
     format!("{begin}{CUT}{end}")
 }
 
 /// Writes a number with the noun for one or for any other number of things: "1 robot", "2 robots".
-pub(crate) fn counted<N: Display + PartialEq + From<u8>>(count: N, one: &str, more: &str) -> String {
+pub(crate) fn counted<N: Display + PartialEq + From<u8>>(
+    count: N,
+    one: &str,
+    more: &str,
+) -> String {
     let word = if count == N::from(1) { one } else { more };
     format!("{count} {word}")
 }
@@ -43,7 +52,11 @@ pub(crate) fn counted<N: Display + PartialEq + From<u8>>(count: N, one: &str, mo
 const CUT: &str = " … ";
 
 fn written(c: char) -> String {
-    if is_unseen(c) { c.escape_default().collect() } else { c.to_string() }
+    if is_unseen(c) {
+        c.escape_default().collect()
+    } else {
+        c.to_string()
+    }
 }
 
 /// Returns true if a character is invisible or controls the display.
@@ -57,7 +70,11 @@ pub fn is_unseen(c: char) -> bool {
 
 /// Formats a time span in its two largest units: "45 s", "12 min 3 s", "3 h 20 min", "2 d 4 h".
 pub(crate) fn duration(seconds: f64) -> String {
-    let whole = if seconds.is_finite() { seconds.max(0.0).round() as u64 } else { 0 };
+    let whole = if seconds.is_finite() {
+        seconds.max(0.0).round() as u64
+    } else {
+        0
+    };
     let (minutes, hours, days) = (whole / 60, whole / 3600, whole / 86400);
     match (days, hours, minutes) {
         (0, 0, 0) => format!("{whole} s"),
@@ -73,8 +90,14 @@ mod tests {
 
     #[test]
     fn what_commands_a_terminal_is_written_out_and_anything_else_stays() {
-        assert_eq!(one_line("a\x1b[2Jb\nc\r\td\u{7f}\u{9b}"), "a\\u{1b}[2Jb\\nc\\r\\td\\u{7f}\\u{9b}");
-        assert_eq!(one_line("x\u{202e}y\u{2066}\u{2028}\u{200b}"), "x\\u{202e}y\\u{2066}\\u{2028}\\u{200b}");
+        assert_eq!(
+            one_line("a\x1b[2Jb\nc\r\td\u{7f}\u{9b}"),
+            "a\\u{1b}[2Jb\\nc\\r\\td\\u{7f}\\u{9b}"
+        );
+        assert_eq!(
+            one_line("x\u{202e}y\u{2066}\u{2028}\u{200b}"),
+            "x\\u{202e}y\\u{2066}\\u{2028}\\u{200b}"
+        );
         let plain = "runs/größe/雪: 0|123, −3.2 × \\ \"quoted\"";
         assert_eq!(one_line(plain), plain);
         assert_eq!(one_line(&one_line("a\x1b")), one_line("a\x1b"));
@@ -83,7 +106,10 @@ mod tests {
     #[test]
     fn one_thing_is_not_several() {
         assert_eq!(counted(1_usize, "robot", "robots"), "1 robot");
-        assert_eq!([0_u64, 2].map(|n| counted(n, "task is", "tasks are")), ["0 tasks are", "2 tasks are"]);
+        assert_eq!(
+            [0_u64, 2].map(|n| counted(n, "task is", "tasks are")),
+            ["0 tasks are", "2 tasks are"]
+        );
     }
 
     #[test]
@@ -101,6 +127,9 @@ mod tests {
     #[test]
     fn durations_have_two_units_at_most() {
         let spans = [0.4, 45.0, 723.0, 12_000.0, 187_200.0, f64::NAN].map(duration);
-        assert_eq!(spans, ["0 s", "45 s", "12 min 3 s", "3 h 20 min", "2 d 4 h", "0 s"]);
+        assert_eq!(
+            spans,
+            ["0 s", "45 s", "12 min 3 s", "3 h 20 min", "2 d 4 h", "0 s"]
+        );
     }
 }

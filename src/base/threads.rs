@@ -14,9 +14,13 @@ pub const MOST_THREADS: u16 = 1024;
 /// Returns an error if it is more than [`MOST_THREADS`].
 pub(crate) fn check_environment() -> Result<(), Error> {
     const NAME: &str = "RAYON_NUM_THREADS";
-    let asked = std::env::var(NAME).ok().and_then(|text| text.parse::<usize>().ok());
+    let asked = std::env::var(NAME)
+        .ok()
+        .and_then(|text| text.parse::<usize>().ok());
     match asked.filter(|threads| *threads > usize::from(MOST_THREADS)) {
-        Some(threads) => Err(Error::usage(format!("{NAME} = {threads}: expected at most {MOST_THREADS}"))),
+        Some(threads) => Err(Error::usage(format!(
+            "{NAME} = {threads}: expected at most {MOST_THREADS}"
+        ))),
         None => Ok(()),
     }
 }
@@ -27,10 +31,15 @@ pub(crate) fn check_environment() -> Result<(), Error> {
 /// Returns an error if the system has no threads left.
 pub fn pool(threads: Option<usize>) -> Result<rayon::ThreadPool, Error> {
     let usual = || match room() {
-        Some(room) if room < std::thread::available_parallelism().map_or(1, usize::from) => room.max(1),
+        Some(room) if room < std::thread::available_parallelism().map_or(1, usize::from) => {
+            room.max(1)
+        }
         _ => 0,
     };
-    rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or_else(usual)).build().map_err(none_left)
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads.unwrap_or_else(usual))
+        .build()
+        .map_err(none_left)
 }
 
 /// Runs work on the current pool, or on a new one if this thread belongs to none; on this thread
@@ -43,7 +52,10 @@ pub(crate) fn in_pool<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, Err
         return Ok(work());
     }
     let pool = match room() {
-        Some(0) => rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build(),
+        Some(0) => rayon::ThreadPoolBuilder::new()
+            .num_threads(1)
+            .use_current_thread()
+            .build(),
         _ => return Ok(pool(None)?.install(work)),
     };
     Ok(pool.map_err(none_left)?.install(work))
@@ -56,7 +68,9 @@ fn room() -> Option<usize> {
     // again at every allocation: drawing a picture takes three times as long.
     const EACH: usize = 128 << 20;
     let limits = std::fs::read_to_string("/proc/self/limits").ok()?;
-    let limit = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
+    let limit = limits
+        .lines()
+        .find_map(|line| line.strip_prefix("Max address space"))?;
     let limit: usize = limit.split_whitespace().next()?.parse().ok()?;
     // The process itself needs as much.
     Some((limit / EACH).saturating_sub(1))
@@ -70,7 +84,10 @@ pub(crate) fn start<T: Send + 'static>(
     name: &str,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Result<JoinHandle<T>, Error> {
-    Builder::new().name(name.to_string()).spawn(work).map_err(none_left)
+    Builder::new()
+        .name(name.to_string())
+        .spawn(work)
+        .map_err(none_left)
 }
 
 /// Runs the same work on this many threads at once, to its end.
@@ -88,7 +105,9 @@ pub(crate) fn at_once(threads: usize, work: impl Fn() + Sync) -> Result<(), Erro
     std::thread::scope(|scope| {
         let mut holds = all_there.write().unwrap_or_else(PoisonError::into_inner);
         for _ in 0..threads {
-            Builder::new().spawn_scoped(scope, worker).map_err(none_left)?;
+            Builder::new()
+                .spawn_scoped(scope, worker)
+                .map_err(none_left)?;
         }
         *holds = true;
         Ok(())
@@ -115,7 +134,9 @@ mod tests {
 
     #[test]
     fn work_in_a_pool_stays_in_it() {
-        let inner = pool(Some(3)).unwrap().install(|| in_pool(rayon::current_num_threads));
+        let inner = pool(Some(3))
+            .unwrap()
+            .install(|| in_pool(rayon::current_num_threads));
         assert_eq!(inner.unwrap(), 3);
         assert!(in_pool(rayon::current_thread_index).unwrap().is_some());
     }

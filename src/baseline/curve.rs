@@ -46,11 +46,19 @@ pub(crate) fn parabola(points: &[(f64, f64)]) -> Option<[f64; 3]> {
     });
     let values = DVector::from_iterator(points.len(), points.iter().map(|point| point.1));
     let solution = matrix.svd(true, true).solve(&values, 1e-12).ok()?;
-    Some([solution[0], solution[1] / scale, solution[2] / (scale * scale)])
+    Some([
+        solution[0],
+        solution[1] / scale,
+        solution[2] / (scale * scale),
+    ])
 }
 
 /// Returns the smallest x in [from, to] at which a parabola reaches a value; `None` if none does.
-pub(crate) fn first_crossing([c0, c1, c2]: [f64; 3], value: f64, (from, to): (f64, f64)) -> Option<Crossing> {
+pub(crate) fn first_crossing(
+    [c0, c1, c2]: [f64; 3],
+    value: f64,
+    (from, to): (f64, f64),
+) -> Option<Crossing> {
     let at = |x: f64| c0 + x * (c1 + x * c2);
     if at(from) > value {
         return Some(Crossing::Below { below: from });
@@ -70,7 +78,10 @@ pub(crate) fn first_crossing([c0, c1, c2]: [f64; 3], value: f64, (from, to): (f6
         let q = -0.5 * (c1 + discriminant.sqrt().copysign(c1));
         [Some(q / c2), (q != 0.0).then(|| c / q)]
     };
-    let within = roots.into_iter().flatten().filter(|root| (from..=to).contains(root));
+    let within = roots
+        .into_iter()
+        .flatten()
+        .filter(|root| (from..=to).contains(root));
     within.min_by(f64::total_cmp).map(Crossing::At)
 }
 
@@ -78,7 +89,11 @@ pub(crate) fn first_crossing([c0, c1, c2]: [f64; 3], value: f64, (from, to): (f6
 pub(crate) fn first_of(points: &[(f64, f64)], value: f64) -> Option<Crossing> {
     let place = points.iter().position(|(_, y)| *y >= value)?;
     let (x, y) = points[place];
-    Some(if place == 0 && y > value { Crossing::Below { below: x } } else { Crossing::At(x) })
+    Some(if place == 0 && y > value {
+        Crossing::Below { below: x }
+    } else {
+        Crossing::At(x)
+    })
 }
 
 #[cfg(test)]
@@ -96,10 +111,14 @@ mod tests {
 
     #[test]
     fn a_parabola_through_points_of_one_is_that_one() {
-        let points: Vec<(f64, f64)> =
-            (1..=45).map(f64::from).map(|x| (x, 0.5 + 0.012 * x - 0.0001 * x * x)).collect();
+        let points: Vec<(f64, f64)> = (1..=45)
+            .map(f64::from)
+            .map(|x| (x, 0.5 + 0.012 * x - 0.0001 * x * x))
+            .collect();
         let [c0, c1, c2] = parabola(&points).unwrap();
-        assert!((c0 - 0.5).abs() < 1e-12 && (c1 - 0.012).abs() < 1e-13 && (c2 + 0.0001).abs() < 1e-14);
+        assert!(
+            (c0 - 0.5).abs() < 1e-12 && (c1 - 0.012).abs() < 1e-13 && (c2 + 0.0001).abs() < 1e-14
+        );
         assert_eq!(parabola(&[(1.0, 0.5), (2.0, 0.6), (2.0, 0.7)]), None);
     }
 
@@ -108,9 +127,19 @@ mod tests {
         let points = [(1.0, 0.5), (2.0, 0.65), (3.0, 0.6), (4.0, 0.8), (5.0, 0.75)];
         let fit = parabola(&points).unwrap();
         let squares = |[c0, c1, c2]: [f64; 3]| -> f64 {
-            points.iter().map(|(x, y)| (c0 + c1 * x + c2 * x * x - y).powi(2)).sum()
+            points
+                .iter()
+                .map(|(x, y)| (c0 + c1 * x + c2 * x * x - y).powi(2))
+                .sum()
         };
-        for (place, change) in [(0, 1e-3), (1, 1e-3), (2, 1e-3), (0, -1e-3), (1, -1e-3), (2, -1e-3)] {
+        for (place, change) in [
+            (0, 1e-3),
+            (1, 1e-3),
+            (2, 1e-3),
+            (0, -1e-3),
+            (1, -1e-3),
+            (2, -1e-3),
+        ] {
             let mut other = fit;
             other[place] += change;
             assert!(squares(other) > squares(fit));
@@ -128,10 +157,26 @@ mod tests {
         let x = first(fit, 0.8);
         assert!((x - (50.0 - 1000_f64.sqrt())).abs() < 1e-9, "{x}");
         let below = Some(Crossing::Below { below: 3.0 });
-        assert_eq!(first_crossing(fit, 0.4, (3.0, 45.0)), below, "the smallest is above it already");
-        assert_eq!(first([0.5, 0.25, 0.0], 0.75), 1.0, "just reached by the smallest");
-        assert_eq!(first_crossing(fit, 1.01, (1.0, 45.0)), None, "above its top");
-        assert_eq!(first_crossing(fit, 0.997, (1.0, 45.0)), None, "reached, but beyond the largest size");
+        assert_eq!(
+            first_crossing(fit, 0.4, (3.0, 45.0)),
+            below,
+            "the smallest is above it already"
+        );
+        assert_eq!(
+            first([0.5, 0.25, 0.0], 0.75),
+            1.0,
+            "just reached by the smallest"
+        );
+        assert_eq!(
+            first_crossing(fit, 1.01, (1.0, 45.0)),
+            None,
+            "above its top"
+        );
+        assert_eq!(
+            first_crossing(fit, 0.997, (1.0, 45.0)),
+            None,
+            "reached, but beyond the largest size"
+        );
         assert_eq!(first([0.5, 0.01, 0.0], 0.6).round(), 10.0);
         assert_eq!(first_crossing([0.5, 0.0, 0.0], 0.6, (1.0, 45.0)), None);
         // A dip, then up again.
@@ -143,12 +188,22 @@ mod tests {
     fn what_is_below_the_smallest_size_is_no_number() {
         for (crossing, text, json) in [
             (Some(Crossing::At(16.84)), "16.8", "16.84"),
-            (Some(Crossing::Below { below: 1.0 }), "< 1", "{\"below\":1.0}"),
+            (
+                Some(Crossing::Below { below: 1.0 }),
+                "< 1",
+                "{\"below\":1.0}",
+            ),
             (None, "", "null"),
         ] {
-            assert_eq!(crossing.map_or(String::new(), |crossing| crossing.to_string()), text);
+            assert_eq!(
+                crossing.map_or(String::new(), |crossing| crossing.to_string()),
+                text
+            );
             assert_eq!(serde_json::to_string(&crossing).unwrap(), json);
-            assert_eq!(serde_json::from_str::<Option<Crossing>>(json).unwrap(), crossing);
+            assert_eq!(
+                serde_json::from_str::<Option<Crossing>>(json).unwrap(),
+                crossing
+            );
         }
     }
 }

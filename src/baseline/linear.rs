@@ -31,14 +31,21 @@ pub(crate) struct Linear {
 /// Returns the nonzero pixels by their indices, followed by the constant 1.
 fn sparse(stimulus: &Grid<f64>) -> Vec<(usize, f64)> {
     let pixels = stimulus.cells();
-    let lit = pixels.iter().copied().enumerate().filter(|(_, value)| *value != 0.0);
+    let lit = pixels
+        .iter()
+        .copied()
+        .enumerate()
+        .filter(|(_, value)| *value != 0.0);
     lit.chain([(pixels.len(), 1.0)]).collect()
 }
 
 impl PixelMoments {
     /// Sums up training images, all of one size.
     pub(crate) fn new(images: &[LabelledPixels]) -> Self {
-        let size = images.first().map_or(0, |(stimulus, _)| stimulus.cells().len()) + 1;
+        let size = images
+            .first()
+            .map_or(0, |(stimulus, _)| stimulus.cells().len())
+            + 1;
         let mut classes: Vec<u8> = images.iter().map(|(_, class)| *class).collect();
         classes.sort_unstable();
         classes.dedup();
@@ -55,7 +62,10 @@ impl PixelMoments {
             sum.fill_lower_triangle_with_upper_triangle();
             (class, sum)
         };
-        PixelMoments { size, by_class: classes.into_par_iter().map(of_class).collect() }
+        PixelMoments {
+            size,
+            by_class: classes.into_par_iter().map(of_class).collect(),
+        }
     }
 
     /// Returns the linear function closest in square to 1 under images of one group's classes, and
@@ -75,15 +85,21 @@ impl PixelMoments {
         for place in 0..self.size {
             square[(place, place)] += penalty;
         }
-        let solved = Cholesky::new(square).expect("a sum of squares with a penalty is positive definite");
-        Linear { weights: solved.solve(&towards) }
+        let solved =
+            Cholesky::new(square).expect("a sum of squares with a penalty is positive definite");
+        Linear {
+            weights: solved.solve(&towards),
+        }
     }
 }
 
 impl Linear {
     /// Returns its value for an image: about 1 for the first group, −1 for the second.
     pub(crate) fn value(&self, stimulus: &Grid<f64>) -> f64 {
-        sparse(stimulus).into_iter().map(|(place, value)| self.weights[place] * value).sum()
+        sparse(stimulus)
+            .into_iter()
+            .map(|(place, value)| self.weights[place] * value)
+            .sum()
     }
 }
 
@@ -96,14 +112,21 @@ mod tests {
         let of = |k: usize| {
             let (a, b) = ((k % 7) as f64 / 10.0, (k % 5) as f64 / 10.0);
             let class = u8::from(k % 2 == 1);
-            let pixels = if class == 0 { [a + 0.35, b] } else { [a, b + 0.65] };
+            let pixels = if class == 0 {
+                [a + 0.35, b]
+            } else {
+                [a, b + 0.65]
+            };
             (Grid::from_fn(1, 2, |_, column| pixels[column]), class)
         };
         (0..140).map(of).collect()
     }
 
     fn labelled(images: &[(Grid<f64>, u8)]) -> Vec<LabelledPixels<'_>> {
-        images.iter().map(|(stimulus, class)| (stimulus, *class)).collect()
+        images
+            .iter()
+            .map(|(stimulus, class)| (stimulus, *class))
+            .collect()
     }
 
     #[test]
@@ -111,8 +134,10 @@ mod tests {
         // The mean of ±1 over equally many images of uninformative pixels is the plane itself.
         let images = images();
         let linear = PixelMoments::new(&labelled(&images)).apart(&[0], &[1]);
-        let right =
-            images.iter().filter(|(image, class)| (linear.value(image) > 0.0) == (*class == 0)).count();
+        let right = images
+            .iter()
+            .filter(|(image, class)| (linear.value(image) > 0.0) == (*class == 0))
+            .count();
         assert!(right >= 120, "{right} of 140");
         // Normal equations: the residual is orthogonal to every pixel, up to the penalty.
         for pixel in [0, 1] {
@@ -127,7 +152,9 @@ mod tests {
     #[test]
     fn pixels_that_are_always_dark_do_no_harm() {
         let dark: Vec<(Grid<f64>, u8)> = (0..4).map(|k| (Grid::filled(2, 2, 0.0), k % 2)).collect();
-        let value = PixelMoments::new(&labelled(&dark)).apart(&[0], &[1]).value(&dark[0].0);
+        let value = PixelMoments::new(&labelled(&dark))
+            .apart(&[0], &[1])
+            .value(&dark[0].0);
         assert!(value.abs() < 1e-12);
     }
 }

@@ -47,15 +47,25 @@ mod tests {
 
     #[test]
     fn the_nearest_image_answers_and_of_several_the_label_that_most_of_them_have() {
-        let of =
-            |left: f64, right: f64| Grid::from_fn(1, 11, |_, column| [left, right][usize::from(column > 8)]);
-        let images = [of(0.0, 1.0), of(1.0, 0.0), of(1.0, 0.0), of(1.0, 0.0), of(0.5, 0.5)];
+        let of = |left: f64, right: f64| {
+            Grid::from_fn(1, 11, |_, column| [left, right][usize::from(column > 8)])
+        };
+        let images = [
+            of(0.0, 1.0),
+            of(1.0, 0.0),
+            of(1.0, 0.0),
+            of(1.0, 0.0),
+            of(0.5, 0.5),
+        ];
         let known = |labels: [char; 5]| images.iter().zip(labels);
         let labels = ['a', 'b', 'c', 'c', 'd'];
         assert_eq!(nearest(known(labels), &images[0]), Some('a'));
         assert_eq!(nearest(known(labels), &images[1]), Some('c'));
         assert_eq!(nearest(known(labels), &of(0.4, 0.6)), Some('d'));
-        assert_eq!(nearest(known(['a', 'c', 'b', 'd', 'd']), &images[1]), Some('c'));
+        assert_eq!(
+            nearest(known(['a', 'c', 'b', 'd', 'd']), &images[1]),
+            Some('c')
+        );
         assert_eq!(nearest(known(labels).take(0), &images[0]), None);
     }
 }

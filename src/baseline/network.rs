@@ -89,7 +89,10 @@ impl Shape {
     /// Returns the rows and columns of places that pooling reduces to one, and of the places it
     /// leaves. An MLP has one place, the whole image.
     fn pooled(&self) -> [(usize, usize); 2] {
-        let (rows, columns) = (self.image.0 + 1 - self.field().0, self.image.1 + 1 - self.field().1);
+        let (rows, columns) = (
+            self.image.0 + 1 - self.field().0,
+            self.image.1 + 1 - self.field().1,
+        );
         let window = match self.kind {
             NetworkKind::Mlp => (1, 1),
             NetworkKind::Cnn => self.pooling.window((rows, columns)),
@@ -111,7 +114,12 @@ impl Shape {
     /// Returns the ranges of the parameters in one vector: hidden weights (by pixel, then by unit),
     /// hidden biases, output weights (by output, then by feature), output biases.
     fn layout(&self) -> [Range<usize>; 4] {
-        let sizes = [self.inputs() * self.size, self.size, self.features() * OUTPUTS, OUTPUTS];
+        let sizes = [
+            self.inputs() * self.size,
+            self.size,
+            self.features() * OUTPUTS,
+            OUTPUTS,
+        ];
         let mut end = 0;
         sizes.map(|size| {
             end += size;
@@ -125,18 +133,27 @@ impl Shape {
     /// # Panics
     /// If the image does not have the shape's size.
     pub(crate) fn patches(&self, image: &Grid<f64>) -> Patches {
-        assert_eq!((image.height(), image.width()), self.image, "an image of the shape's size");
+        assert_eq!(
+            (image.height(), image.width()),
+            self.image,
+            "an image of the shape's size"
+        );
         let [window, pooled] = self.pooled();
         let grid = |(rows, columns): (usize, usize)| {
             (0..rows).flat_map(move |row| (0..columns).map(move |column| (row, column)))
         };
-        let mut patches = Patches { ends: Vec::new(), lit: Vec::new() };
+        let mut patches = Patches {
+            ends: Vec::new(),
+            lit: Vec::new(),
+        };
         for place in grid(pooled) {
             for within in grid(window) {
                 let corner = (place.0 * window.0 + within.0, place.1 * window.1 + within.1);
-                let pixels =
-                    grid(self.field()).map(|(row, column)| image[(corner.0 + row, corner.1 + column)]);
-                patches.lit.extend(pixels.enumerate().filter(|(_, value)| *value != 0.0));
+                let pixels = grid(self.field())
+                    .map(|(row, column)| image[(corner.0 + row, corner.1 + column)]);
+                patches
+                    .lit
+                    .extend(pixels.enumerate().filter(|(_, value)| *value != 0.0));
                 patches.ends.push(patches.lit.len());
             }
         }
@@ -195,7 +212,12 @@ impl Network {
         }
         let (within, places) = shape.places();
         let units = vec![0.0; within * places * size];
-        Network { shape, parameters, units, features: DVector::zeros(features) }
+        Network {
+            shape,
+            parameters,
+            units,
+            features: DVector::zeros(features),
+        }
     }
 
     /// Returns the trained parameters.
@@ -211,12 +233,15 @@ impl Network {
     fn output_weights(&self, output: usize) -> DVectorView<'_, f64> {
         let [_, _, weights, _] = self.shape.layout();
         let features = self.shape.features();
-        self.parameters.rows(weights.start + output * features, features)
+        self.parameters
+            .rows(weights.start + output * features, features)
     }
 
     /// Computes the outputs for an image, before the softmax.
     pub(crate) fn forward(&mut self, image: &Patches) -> [f64; OUTPUTS] {
-        let Shape { size, activation, .. } = self.shape;
+        let Shape {
+            size, activation, ..
+        } = self.shape;
         let [hidden, biases, _, output_biases] = self.shape.layout();
         let hidden = &self.parameters.as_slice()[hidden];
         let biases = &self.parameters.as_slice()[biases];
@@ -232,24 +257,33 @@ impl Network {
             pool(&mut features[first..][..size], units, self.shape.pooling);
         }
         let output = |output: usize| {
-            self.output_weights(output).dot(&self.features) + self.parameters[output_biases.start + output]
+            self.output_weights(output).dot(&self.features)
+                + self.parameters[output_biases.start + output]
         };
         std::array::from_fn(output)
     }
 
     /// Adds to `gradient` a loss's derivatives by the parameters, given those by the outputs, for
     /// the last image of [`forward`](Network::forward).
-    pub(crate) fn backward(&self, image: &Patches, outputs: [f64; OUTPUTS], gradient: &mut DVector<f64>) {
-        let Shape { size, activation, pooling, .. } = self.shape;
+    pub(crate) fn backward(
+        &self,
+        image: &Patches,
+        outputs: [f64; OUTPUTS],
+        gradient: &mut DVector<f64>,
+    ) {
+        let Shape {
+            size,
+            activation,
+            pooling,
+            ..
+        } = self.shape;
         let [hidden, biases, weights, output_biases] = self.shape.layout();
         let features = self.shape.features();
         let mut by_features = DVector::zeros(features);
         for (output, derivative) in outputs.into_iter().enumerate() {
-            gradient.rows_mut(weights.start + output * features, features).axpy(
-                derivative,
-                &self.features,
-                1.0,
-            );
+            gradient
+                .rows_mut(weights.start + output * features, features)
+                .axpy(derivative, &self.features, 1.0);
             gradient[output_biases.start + output] += derivative;
             by_features.axpy(derivative, &self.output_weights(output), 1.0);
         }
@@ -265,15 +299,22 @@ impl Network {
                     _ => {
                         let of_place = (place / within * within..place)
                             .all(|other| self.units[other * size + number] < units[number]);
-                        f64::from(u8::from(of_place && units[number] == self.features[feature + number]))
+                        f64::from(u8::from(
+                            of_place && units[number] == self.features[feature + number],
+                        ))
                     }
                 };
-                *derivative = by_features[feature + number] * share * activation.slope(units[number]);
+                *derivative =
+                    by_features[feature + number] * share * activation.slope(units[number]);
             }
             let gradient = gradient.as_mut_slice();
             add_scaled(&mut gradient[biases.clone()], 1.0, &by_units);
             for &(pixel, value) in image.at(place) {
-                add_scaled(&mut gradient[hidden.start + pixel * size..][..size], value, &by_units);
+                add_scaled(
+                    &mut gradient[hidden.start + pixel * size..][..size],
+                    value,
+                    &by_units,
+                );
             }
         }
     }
@@ -340,7 +381,11 @@ fn pool(features: &mut [f64], units: &[f64], pooling: Pooling) {
             }
         } else {
             for i in 0..size {
-                features[i] = if units[i] > features[i] { units[i] } else { features[i] };
+                features[i] = if units[i] > features[i] {
+                    units[i]
+                } else {
+                    features[i]
+                };
             }
         }
     }
@@ -381,9 +426,15 @@ mod tests {
     fn images() -> Vec<Grid<f64>> {
         let rng = &mut stream(5, Purpose::Networks, 0, 0);
         let pixel = |row: usize, column: usize, rng: &mut Stream| {
-            if (row + column).is_multiple_of(3) { 0.0 } else { rng.uniform(0.0, 1.0) }
+            if (row + column).is_multiple_of(3) {
+                0.0
+            } else {
+                rng.uniform(0.0, 1.0)
+            }
         };
-        (0..3).map(|_| Grid::from_fn(IMAGE.0, IMAGE.1, |row, column| pixel(row, column, rng))).collect()
+        (0..3)
+            .map(|_| Grid::from_fn(IMAGE.0, IMAGE.1, |row, column| pixel(row, column, rng)))
+            .collect()
     }
 
     fn shapes() -> impl Iterator<Item = Shape> {
@@ -395,16 +446,18 @@ mod tests {
             (NetworkKind::Cnn, Pooling::Mean),
             (NetworkKind::Cnn, Pooling::Max),
         ];
-        [Activation::Relu, Activation::Tanh, Activation::Sigmoid].into_iter().flat_map(move |activation| {
-            layers.map(|(kind, pooling)| Shape {
-                kind,
-                size: 4,
-                image: IMAGE,
-                kernel: 3,
-                activation,
-                pooling,
+        [Activation::Relu, Activation::Tanh, Activation::Sigmoid]
+            .into_iter()
+            .flat_map(move |activation| {
+                layers.map(|(kind, pooling)| Shape {
+                    kind,
+                    size: 4,
+                    image: IMAGE,
+                    kernel: 3,
+                    activation,
+                    pooling,
+                })
             })
-        })
     }
 
     fn network(shape: Shape) -> Network {
@@ -437,11 +490,15 @@ mod tests {
             let mut network = network(shape);
             // A 7 × 6 image has 5 × 4 places for 3 × 3 kernels, in 2 × 2 windows of 2 × 2.
             let corners = |rows: Range<usize>, columns: Range<usize>| {
-                rows.flat_map(|row| columns.clone().map(move |column| (row, column))).collect::<Vec<_>>()
+                rows.flat_map(|row| columns.clone().map(move |column| (row, column)))
+                    .collect::<Vec<_>>()
             };
             let windows: Vec<Vec<(usize, usize)>> = match (shape.kind, shape.pooling) {
                 (NetworkKind::Mlp, _) => vec![vec![(0, 0)]],
-                (_, Pooling::None) => corners(0..5, 0..4).into_iter().map(|corner| vec![corner]).collect(),
+                (_, Pooling::None) => corners(0..5, 0..4)
+                    .into_iter()
+                    .map(|corner| vec![corner])
+                    .collect(),
                 (_, Pooling::Max2) => corners(0..2, 0..2)
                     .into_iter()
                     .map(|(row, column)| corners(2 * row..2 * row + 2, 2 * column..2 * column + 2))
@@ -456,14 +513,24 @@ mod tests {
                     let mut expected = network.parameters[biases.start + output];
                     for (number, window) in windows.iter().enumerate() {
                         for k in 0..shape.size {
-                            let all: Vec<f64> =
-                                window.iter().map(|corner| unit(&network, k, &image, *corner)).collect();
-                            let pooled = if shape.pooling == Pooling::Mean { mean(&all) } else { most(&all) };
-                            let weight = weights.start + output * features + number * shape.size + k;
+                            let all: Vec<f64> = window
+                                .iter()
+                                .map(|corner| unit(&network, k, &image, *corner))
+                                .collect();
+                            let pooled = if shape.pooling == Pooling::Mean {
+                                mean(&all)
+                            } else {
+                                most(&all)
+                            };
+                            let weight =
+                                weights.start + output * features + number * shape.size + k;
                             expected += pooled * network.parameters[weight];
                         }
                     }
-                    assert!((found - expected).abs() < 1e-12, "{shape:?}: {found} {expected}");
+                    assert!(
+                        (found - expected).abs() < 1e-12,
+                        "{shape:?}: {found} {expected}"
+                    );
                 }
             }
         }
@@ -476,7 +543,8 @@ mod tests {
             let mut network = network(shape);
             let images: Vec<Patches> = images().iter().map(|image| shape.patches(image)).collect();
             let loss = |network: &mut Network| -> f64 {
-                let of_image = |(number, image)| cross_entropy(network.forward(image), number % 2).0;
+                let of_image =
+                    |(number, image)| cross_entropy(network.forward(image), number % 2).0;
                 images.iter().enumerate().map(of_image).sum()
             };
             let mut gradient = DVector::zeros(network.parameters.len());
@@ -492,7 +560,10 @@ mod tests {
                 });
                 network.parameters[parameter] = kept;
                 let (found, expected) = (gradient[parameter], (above - below) / (2.0 * STEP));
-                assert!((found - expected).abs() < 1e-8, "{shape:?}, {parameter}: {found} {expected}");
+                assert!(
+                    (found - expected).abs() < 1e-8,
+                    "{shape:?}, {parameter}: {found} {expected}"
+                );
             }
         }
     }

@@ -47,9 +47,24 @@ impl Samples {
         if let Some(other) = images.iter().map(size).find(|other| *other != first) {
             return Err(SamplesError::Size { first, other });
         }
-        let Hyperparameters { kernel, activation, pooling, .. } = *hyper;
-        let shape = Shape { kind, size: 1, image: first, kernel, activation, pooling };
-        let images = images.iter().map(|(image, group)| (shape.patches(image), *group)).collect();
+        let Hyperparameters {
+            kernel,
+            activation,
+            pooling,
+            ..
+        } = *hyper;
+        let shape = Shape {
+            kind,
+            size: 1,
+            image: first,
+            kernel,
+            activation,
+            pooling,
+        };
+        let images = images
+            .iter()
+            .map(|(image, group)| (shape.patches(image), *group))
+            .collect();
         Ok(Samples { images, shape })
     }
 }
@@ -69,7 +84,14 @@ fn test(
         loss += cross_entropy(outputs, *group).0;
     }
     let accuracy = correct as f64 / samples.images.len() as f64;
-    Ok((accuracy, if watch == Watch::Accuracy { accuracy } else { -loss }))
+    Ok((
+        accuracy,
+        if watch == Watch::Accuracy {
+            accuracy
+        } else {
+            -loss
+        },
+    ))
 }
 
 /// Adam (Kingma & Ba 2015) with its usual constants.
@@ -86,7 +108,11 @@ impl Adam {
     const EPSILON: f64 = 1e-8;
 
     fn new(rate: f64, parameters: usize) -> Self {
-        Adam { rate, moments: [0, 1].map(|_| DVector::zeros(parameters)), powers: [1.0, 1.0] }
+        Adam {
+            rate,
+            moments: [0, 1].map(|_| DVector::zeros(parameters)),
+            powers: [1.0, 1.0],
+        }
     }
 
     fn step(&mut self, parameters: &mut DVector<f64>, gradient: &DVector<f64>) {
@@ -98,7 +124,8 @@ impl Adam {
         for (i, g) in gradient.iter().enumerate() {
             m[i] = beta1 * m[i] + (1.0 - beta1) * g;
             v[i] = beta2 * v[i] + (1.0 - beta2) * g * g;
-            parameters[i] -= self.rate * (m[i] * scales[0]) / ((v[i] * scales[1]).sqrt() + Self::EPSILON);
+            parameters[i] -=
+                self.rate * (m[i] * scales[0]) / ((v[i] * scales[1]).sqrt() + Self::EPSILON);
         }
     }
 }
@@ -117,8 +144,19 @@ pub(crate) fn train(
     rng: &mut Stream,
     session: &Session,
 ) -> Result<Trained, Stopped> {
-    let Hyperparameters { epochs, patience, watch, .. } = *hyper;
-    let mut network = Network::new(Shape { size, ..training.shape }, rng);
+    let Hyperparameters {
+        epochs,
+        patience,
+        watch,
+        ..
+    } = *hyper;
+    let mut network = Network::new(
+        Shape {
+            size,
+            ..training.shape
+        },
+        rng,
+    );
     let parameters = network.parameters().len();
     let mut adam = Adam::new(hyper.learning_rate, parameters);
     let mut gradient = DVector::zeros(parameters);
@@ -144,7 +182,13 @@ pub(crate) fn train(
         let (accuracy, value) = test(&mut network, waiting, watch, session)?;
         present = Some(accuracy);
         if best.as_ref().is_none_or(|(least, _)| value > *least) {
-            (best, waited) = (Some((value, hyper.restore_best.then(|| network.parameters().clone()))), 0);
+            (best, waited) = (
+                Some((
+                    value,
+                    hyper.restore_best.then(|| network.parameters().clone()),
+                )),
+                0,
+            );
         } else {
             waited += 1;
         }
@@ -157,7 +201,11 @@ pub(crate) fn train(
         Some(known) => known,
         None => test(&mut network, test_set, Watch::Accuracy, session)?.0,
     };
-    Ok(Trained { accuracy, epochs: done, parameters })
+    Ok(Trained {
+        accuracy,
+        epochs: done,
+        parameters,
+    })
 }
 
 #[cfg(test)]
@@ -170,7 +218,9 @@ mod tests {
     /// Makes noisy images that are brighter at the top, or at the bottom.
     fn samples(seed: u64, count: usize, kind: NetworkKind, hyper: &Hyperparameters) -> Samples {
         let rng = &mut stream(seed, Purpose::Networks, 0, 0);
-        let groups: Vec<usize> = (0..count).map(|number| usize::from(number % 3 == 0)).collect();
+        let groups: Vec<usize> = (0..count)
+            .map(|number| usize::from(number % 3 == 0))
+            .collect();
         let images: Vec<Grid<f64>> = groups
             .iter()
             .map(|&group| {
@@ -184,7 +234,8 @@ mod tests {
     }
 
     fn trained(kind: NetworkKind, hyper: &Hyperparameters, seed: u64) -> Trained {
-        let [learn, test] = [(1, 12), (2, 150)].map(|(seed, count)| samples(seed, count, kind, hyper));
+        let [learn, test] =
+            [(1, 12), (2, 150)].map(|(seed, count)| samples(seed, count, kind, hyper));
         let rng = &mut stream(seed, Purpose::Networks, 1, 0);
         train(8, hyper, &learn, &test, &test, rng, &Session::default()).unwrap()
     }
@@ -200,20 +251,34 @@ mod tests {
                     patience: 50,
                     ..Default::default()
                 };
-                let Trained { accuracy, epochs, .. } = trained(kind, &hyper, 1);
-                assert!(accuracy > 0.95 && epochs == 50, "{kind:?} {watch:?}: {accuracy}");
+                let Trained {
+                    accuracy, epochs, ..
+                } = trained(kind, &hyper, 1);
+                assert!(
+                    accuracy > 0.95 && epochs == 50,
+                    "{kind:?} {watch:?}: {accuracy}"
+                );
             }
         }
     }
 
     #[test]
     fn the_best_epochs_network_is_tested_on_request_and_patience_ends_training() {
-        let last = Hyperparameters { learning_rate: 0.03, batch: 0, ..Default::default() };
-        let best = Hyperparameters { restore_best: true, ..last };
+        let last = Hyperparameters {
+            learning_rate: 0.03,
+            batch: 0,
+            ..Default::default()
+        };
+        let best = Hyperparameters {
+            restore_best: true,
+            ..last
+        };
         let mut better = 0;
         for seed in 0..8 {
             let [last, best] = [last, best].map(|hyper| trained(NetworkKind::Mlp, &hyper, seed));
-            assert!(best.accuracy >= last.accuracy && best.epochs == last.epochs && best.epochs < 50);
+            assert!(
+                best.accuracy >= last.accuracy && best.epochs == last.epochs && best.epochs < 50
+            );
             better += usize::from(best.accuracy > last.accuracy);
         }
         assert!(better > 0);
@@ -231,10 +296,21 @@ mod tests {
                 (Activation::Tanh, Pooling::Max2),
                 (Activation::Sigmoid, Pooling::Mean),
             ] {
-                let hyper = Hyperparameters { activation, pooling, batch: 5, ..Default::default() };
+                let hyper = Hyperparameters {
+                    activation,
+                    pooling,
+                    batch: 5,
+                    ..Default::default()
+                };
                 let images = samples(1, 12, kind, &hyper);
                 let rng = &mut stream(6, Purpose::Networks, 1, 0);
-                let mut network = Network::new(Shape { size: 5, ..images.shape }, rng);
+                let mut network = Network::new(
+                    Shape {
+                        size: 5,
+                        ..images.shape
+                    },
+                    rng,
+                );
                 let mut adam = Adam::new(hyper.learning_rate, network.parameters().len());
                 for (image, group) in &images.images {
                     let mut gradient = DVector::zeros(network.parameters().len());
@@ -242,7 +318,12 @@ mod tests {
                     network.backward(image, by_outputs, &mut gradient);
                     adam.step(network.parameters_mut(), &gradient);
                 }
-                bits.extend(network.parameters().iter().map(|x| format!("{:016x}", x.to_bits())));
+                bits.extend(
+                    network
+                        .parameters()
+                        .iter()
+                        .map(|x| format!("{:016x}", x.to_bits())),
+                );
             }
         }
         assert_eq!(crate::base::hash::sha256_hex(bits.as_bytes()), PINNED);
@@ -251,7 +332,11 @@ mod tests {
 
     #[test]
     fn a_training_is_stopped_between_images() {
-        let hyper = Hyperparameters { epochs: 1_000_000, patience: 1_000_000, ..Default::default() };
+        let hyper = Hyperparameters {
+            epochs: 1_000_000,
+            patience: 1_000_000,
+            ..Default::default()
+        };
         let [learn, test] = [12, 150].map(|count| samples(1, count, NetworkKind::Cnn, &hyper));
         let rng = &mut stream(1, Purpose::Networks, 1, 0);
         let stop = AtomicBool::new(false);
@@ -261,7 +346,15 @@ mod tests {
                 std::thread::sleep(std::time::Duration::from_millis(50));
                 stop.store(true, std::sync::atomic::Ordering::Relaxed);
             });
-            train(8, &hyper, &learn, &test, &test, rng, &Session::new(&stop, &()))
+            train(
+                8,
+                &hyper,
+                &learn,
+                &test,
+                &test,
+                rng,
+                &Session::new(&stop, &()),
+            )
         });
         assert_eq!(ended, Err(Stopped));
         assert!(begin.elapsed().as_secs() < 5, "{:?}", begin.elapsed());
@@ -269,7 +362,8 @@ mod tests {
 
     #[test]
     fn no_images_and_images_of_several_sizes_are_refused() {
-        let [image, other] = [(6, 6), (6, 7)].map(|(rows, columns)| Grid::from_fn(rows, columns, |_, _| 0.5));
+        let [image, other] =
+            [(6, 6), (6, 7)].map(|(rows, columns)| Grid::from_fn(rows, columns, |_, _| 0.5));
         let new = |images: &[(&Grid<f64>, usize)]| {
             Samples::new(images, NetworkKind::Mlp, &Hyperparameters::default())
                 .map(|_| ())
@@ -277,6 +371,9 @@ mod tests {
                 .to_string()
         };
         assert_eq!(new(&[]), "expected images, found none");
-        assert_eq!(new(&[(&image, 0), (&other, 1)]), "expected images of 6 × 6 pixels, found 6 × 7");
+        assert_eq!(
+            new(&[(&image, 0), (&other, 1)]),
+            "expected images of 6 × 6 pixels, found 6 × 7"
+        );
     }
 }

@@ -15,7 +15,9 @@ use crate::cli::sweep::SweepArgs;
 use crate::cli::team::TeamArgs;
 use crate::cli::train::TrainArgs;
 use crate::cli::values::{MOST, decimal, held_out, offering, seed, threads, whole};
-use crate::cli::{audit, capacity, demo, plot, report, reproduce, response, serve, sweep, team, train};
+use crate::cli::{
+    audit, capacity, demo, plot, report, reproduce, response, serve, sweep, team, train,
+};
 use crate::commands::plan::PAPER_TOML;
 use crate::commands::replay::ShownImage;
 use crate::commands::schema;
@@ -196,7 +198,9 @@ Examples:
     #[command(after_help = "Examples:\n  morphcog gallery\n  morphcog replay --robot XFJPI")]
     Gallery,
     /// List the built-in configs, or print one to start your own from.
-    #[command(after_help = "Examples:\n  morphcog config\n  morphcog config zero_one.toml > mine.toml")]
+    #[command(
+        after_help = "Examples:\n  morphcog config\n  morphcog config zero_one.toml > mine.toml"
+    )]
     Config {
         /// Name of a built-in config, or a file: printed with its defaults.
         #[arg(value_parser = config_or_file(), hide_possible_values = true)]
@@ -462,12 +466,18 @@ const FORMATS: [&str; 4] = ["gif", "html", "png", "terminal"];
 
 fn config_or_file() -> impl TypedValueParser<Value = String> {
     let names = config::BUILT_IN.map(|(name, _)| name);
-    offering(names.into_iter().chain([PAPER_TOML.0]), StringValueParser::new())
+    offering(
+        names.into_iter().chain([PAPER_TOML.0]),
+        StringValueParser::new(),
+    )
 }
 
 /// Parses the name of a dataset, which may be the user's own.
 fn dataset() -> impl TypedValueParser<Value = String> {
-    offering([BUILTIN].into_iter().chain(FETCHABLE), StringValueParser::new())
+    offering(
+        [BUILTIN].into_iter().chain(FETCHABLE),
+        StringValueParser::new(),
+    )
 }
 
 impl Cli {
@@ -490,12 +500,25 @@ mod tests {
     /// Returns the commands in the examples of a help text, as a shell reads them.
     fn examples(help: &str) -> Vec<Vec<String>> {
         let help = help.replace(" \\\n", " ").replace(" |\n", " | ");
-        let lines = help.lines().filter(|line| line.starts_with("  ") && !line.trim_start().starts_with('#'));
-        let begin = |line: &str| line.find("morphcog ").map(|place| line[place..].to_string());
+        let lines = help
+            .lines()
+            .filter(|line| line.starts_with("  ") && !line.trim_start().starts_with('#'));
+        let begin = |line: &str| {
+            line.find("morphcog ")
+                .map(|place| line[place..].to_string())
+        };
         let ends = [" | ", " > ", " && "];
         let command = |line: String| {
-            let end = ends.iter().filter_map(|end| line.find(end)).min().unwrap_or(line.len());
-            line[..end].replace('"', "").split_whitespace().map(str::to_string).collect()
+            let end = ends
+                .iter()
+                .filter_map(|end| line.find(end))
+                .min()
+                .unwrap_or(line.len());
+            line[..end]
+                .replace('"', "")
+                .split_whitespace()
+                .map(str::to_string)
+                .collect()
         };
         lines.filter_map(begin).map(command).collect()
     }
@@ -505,13 +528,23 @@ mod tests {
         let help = narrow.render_help().to_string();
         let (_, footer) = help.rsplit_once("Example").unwrap();
         let whole = command.get_after_help().unwrap().to_string();
-        assert_eq!(examples(footer), examples(whole.rsplit_once("Example").unwrap().1));
+        assert_eq!(
+            examples(footer),
+            examples(whole.rsplit_once("Example").unwrap().1)
+        );
         for words in examples(footer) {
             let read = with_negative_numbers(Cli::command()).try_get_matches_from(&words);
-            assert!(read.is_ok(), "{columns} columns: {words:?}: {}", read.unwrap_err());
+            assert!(
+                read.is_ok(),
+                "{columns} columns: {words:?}: {}",
+                read.unwrap_err()
+            );
             *count += 1;
         }
-        for sub in command.get_subcommands_mut().filter(|sub| sub.get_name() != "help") {
+        for sub in command
+            .get_subcommands_mut()
+            .filter(|sub| sub.get_name() != "help")
+        {
             check(sub, columns, count);
         }
     }

@@ -79,8 +79,14 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
     let (archives, chosen) = robots::archives(args.archives.paths(), chosen)?;
     choice::say_simulated(&archives, console);
     // The robots are chosen from all runs before the first rollout.
-    let runs: Vec<StoredRun> = archives.iter().map(|path| robots::open(path)).collect::<Result<_, _>>()?;
-    different(runs.iter().map(|source| (source.path.as_path(), &source.run)))?;
+    let runs: Vec<StoredRun> = archives
+        .iter()
+        .map(|path| robots::open(path))
+        .collect::<Result<_, _>>()?;
+    different(
+        runs.iter()
+            .map(|source| (source.path.as_path(), &source.run)),
+    )?;
     let asked = chosen.of_each(&runs, args.seed)?;
     if archives.len() > 1 && args.out.is_some() {
         let text = "--out: expected with one --archive only; of several, each gets an audit.json beside it";
@@ -101,7 +107,10 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
             fresh: args.fresh,
             out: args.out.clone().unwrap_or(beside),
         };
-        let with = Resources { ranks, ..Resources::of(args.threads, args.data.clone()) };
+        let with = Resources {
+            ranks,
+            ..Resources::of(args.threads, args.data.clone())
+        };
         let finished = in_session(console, with, |session| audit::audit(&options, session))?;
         say_known(&finished, &options.out, console);
         verdicts::audit(console, &finished, &options.out);
@@ -112,7 +121,10 @@ pub(super) fn run(args: AuditArgs, console: &Console, ranks: Ranks) -> Result<()
             let text = match finished.file.robots.len() {
                 0 => "stopped before the first robot was audited; nothing is written".to_string(),
                 audited => {
-                    format!("stopped; {} audited and saved", counted(audited, "robot is", "robots are"))
+                    format!(
+                        "stopped; {} audited and saved",
+                        counted(audited, "robot is", "robots are")
+                    )
                 }
             };
             return Err(Error::stopped(text).remedy(Remedy::Repeat));
@@ -131,7 +143,9 @@ fn say_known(finished: &AuditOutcome, out: &Path, console: &Console) {
         Some(path) => format!("{}, which ships with the run", path.display()),
         None => out.display().to_string(),
     };
-    console.info(&format!("{robots} audited before ({place}); --fresh audits again"));
+    console.info(&format!(
+        "{robots} audited before ({place}); --fresh audits again"
+    ));
 }
 
 /// Returns the best robots on validation images, from earlier results or from a search now.
@@ -141,13 +155,23 @@ fn validated(
     ranks: Ranks,
     console: &Console,
 ) -> Result<Selection, Error> {
-    let options = validation::ValidationOptions { archive: archive.to_path_buf(), best: Some(best) };
-    let with = Resources { ranks, ..Resources::of(args.threads, args.data.clone()) };
-    let found = in_session(console, with, |session| validation::validate(&options, session))?;
+    let options = validation::ValidationOptions {
+        archive: archive.to_path_buf(),
+        best: Some(best),
+    };
+    let with = Resources {
+        ranks,
+        ..Resources::of(args.threads, args.data.clone())
+    };
+    let found = in_session(console, with, |session| {
+        validation::validate(&options, session)
+    })?;
     let all_know = ranks.all(found.is_some());
     let Some(found) = found.filter(|_| all_know) else {
         let text = "stopped before the robots were chosen; nothing is audited";
         return Err(Error::stopped(text.to_string()).remedy(Remedy::Repeat));
     };
-    Ok(Selection::Ids(found.into_iter().map(|robot| robot.id).collect()))
+    Ok(Selection::Ids(
+        found.into_iter().map(|robot| robot.id).collect(),
+    ))
 }

@@ -70,9 +70,15 @@ pub(super) fn run(args: CapacityArgs, console: &Console) -> Result<(), Error> {
         eval,
     };
     let with = Resources::of(args.threads, args.data);
-    let finished = in_session(console, with, |session| capacity::capacity(&options, session))?;
+    let finished = in_session(console, with, |session| {
+        capacity::capacity(&options, session)
+    })?;
     let capacity::CapacityOutcome { file, unwritten } = finished;
-    networks::capacity(console, &file, unwritten.is_none().then_some(options.out.as_path()));
+    networks::capacity(
+        console,
+        &file,
+        unwritten.is_none().then_some(options.out.as_path()),
+    );
     if let Some(error) = unwritten {
         return Err(error);
     }

@@ -32,7 +32,11 @@ pub(super) struct Archives {
 impl Archives {
     /// Returns the path of every run.json.
     pub(super) fn paths(&self) -> Vec<PathBuf> {
-        self.archive.iter().flat_map(|Runs(paths)| paths).cloned().collect()
+        self.archive
+            .iter()
+            .flat_map(|Runs(paths)| paths)
+            .cloned()
+            .collect()
     }
 }
 
@@ -74,23 +78,32 @@ pub(super) fn one_by_one(
     say_simulated(&archives, console);
     // Only a search on validation images stops in an orderly way; signals end all else at once.
     match search.robots.validated() {
-        Some(_) => {
-            in_session(console, Resources::of(None, data), |session| one_by_one::named(search, session))
-        }
-        None => one_by_one::named(search, &Session::new(&NEVER, &Reporter::new(console)).data(data)),
+        Some(_) => in_session(console, Resources::of(None, data), |session| {
+            one_by_one::named(search, session)
+        }),
+        None => one_by_one::named(
+            search,
+            &Session::new(&NEVER, &Reporter::new(console)).data(data),
+        ),
     }
 }
 
 /// Prints the messages of [`say_unfinished`] and [`warn_of_versions`], for commands that simulate
 /// robots of these archives again.
-pub(super) fn say_simulated<'a>(archives: impl IntoIterator<Item = &'a PathBuf> + Clone, console: &Console) {
+pub(super) fn say_simulated<'a>(
+    archives: impl IntoIterator<Item = &'a PathBuf> + Clone,
+    console: &Console,
+) {
     say_unfinished(archives.clone(), console);
     warn_of_versions(archives, console);
 }
 
 /// Warns of archives that another version of the program made: their robots may walk differently
 /// here. Named runs came with this version, whose tests simulate them.
-pub(super) fn warn_of_versions<'a>(archives: impl IntoIterator<Item = &'a PathBuf>, console: &Console) {
+pub(super) fn warn_of_versions<'a>(
+    archives: impl IntoIterator<Item = &'a PathBuf>,
+    console: &Console,
+) {
     let of_others: Vec<(PathBuf, String)> = meant(archives)
         .filter_map(|path| RunFile::other_version(&path).map(|version| (path, version)))
         .collect();
@@ -101,7 +114,10 @@ pub(super) fn warn_of_versions<'a>(archives: impl IntoIterator<Item = &'a PathBu
         0 => String::new(),
         more => format!(" and {}", counted(more, "other run", "other runs")),
     };
-    let versions: BTreeSet<&str> = of_others.iter().map(|(_, version)| version.as_str()).collect();
+    let versions: BTreeSet<&str> = of_others
+        .iter()
+        .map(|(_, version)| version.as_str())
+        .collect();
     console.warning(&format!(
         "{}{more}: made by morphcog {}; this is {}, whose numbers may be others",
         path.display(),
@@ -121,7 +137,10 @@ fn meant<'a>(archives: impl IntoIterator<Item = &'a PathBuf>) -> impl Iterator<I
 
 /// Reports archives whose runs have not ended, since a command reads the robots they have so far.
 /// Without archives, it checks the newest run.
-pub(super) fn say_unfinished<'a>(archives: impl IntoIterator<Item = &'a PathBuf>, console: &Console) {
+pub(super) fn say_unfinished<'a>(
+    archives: impl IntoIterator<Item = &'a PathBuf>,
+    console: &Console,
+) {
     // Named runs do not go on.
     for path in meant(archives) {
         if let Some((done, asked)) = RunFile::progress(&path).filter(|(done, asked)| done < asked) {

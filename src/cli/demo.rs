@@ -79,16 +79,20 @@ pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
         set: LITTLE.map(str::to_string).to_vec(),
         name: "demo".to_string(),
         out: args.out.clone(),
-        if_exists: if args.force { IfExists::Overwrite } else { IfExists::Resume },
+        if_exists: if args.force {
+            IfExists::Overwrite
+        } else {
+            IfExists::Resume
+        },
     };
     let with = Resources::of(args.threads, None);
-    let finished =
-        in_session(console, with.clone(), |session| train::train(&options, session)).map_err(|error| {
-            match error.kind {
-                ErrorKind::Stopped => error.remedy(Remedy::Repeat),
-                _ => error,
-            }
-        })?;
+    let finished = in_session(console, with.clone(), |session| {
+        train::train(&options, session)
+    })
+    .map_err(|error| match error.kind {
+        ErrorKind::Stopped => error.remedy(Remedy::Repeat),
+        _ => error,
+    })?;
     summary::training(console, &finished, &options.out);
     let archive = options.out.join(RUN_JSON);
     let tested = eval::EvalOptions {
@@ -104,7 +108,10 @@ pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
         dataset: None,
     };
     test(&tested, with, console)?;
-    let shown = replay::ReplayOptions { images: new_digits()?, ..replay::ReplayOptions::default() };
+    let shown = replay::ReplayOptions {
+        images: new_digits()?,
+        ..replay::ReplayOptions::default()
+    };
     replay_best(&options.out, shown, console)
 }
 
@@ -113,7 +120,14 @@ fn new_digits() -> Result<Vec<ShownImage>, Error> {
     let digits = Dataset::builtin(BuiltinDigits::default(), &[Split::Test]);
     let digits = digits.map_err(|error| Error::other(error.to_string()))?;
     let first = |class: u8| digits.indices_of(Split::Test, class).first().copied();
-    Ok([0, 1].into_iter().filter_map(first).map(|index| ShownImage { split: Split::Test, index }).collect())
+    Ok([0, 1]
+        .into_iter()
+        .filter_map(first)
+        .map(|index| ShownImage {
+            split: Split::Test,
+            index,
+        })
+        .collect())
 }
 
 #[cfg(test)]
@@ -132,13 +146,26 @@ mod tests {
         let StoredRun { run, .. } = StoredRun::read(&archive).unwrap();
         let set = LITTLE.map(str::to_string);
         let config = training::config_of(&run.config, &[vec![0], vec![1]], Some(1), &set).unwrap();
-        assert_eq!((config.data.dataset.as_str(), config.train.random_images), ("builtin", 600));
+        assert_eq!(
+            (config.data.dataset.as_str(), config.train.random_images),
+            ("builtin", 600)
+        );
         // After a change of version, `morphcog response` makes it anew.
         let file = ResponseFile::read(&archive.with_file_name(RESPONSE_JSON)).unwrap();
         let conditions: Vec<_> = config.train.perturbations.conditions().collect();
         let probing = Probing::new(&conditions, run.config.seed);
         let gait = Gait::of(&run.best().unwrap().body).unwrap();
-        assert_eq!(file.known(&run.fingerprint(), run.config.seed, probing.conditions(), &gait).0.len(), 600);
+        assert_eq!(
+            file.known(
+                &run.fingerprint(),
+                run.config.seed,
+                probing.conditions(),
+                &gait
+            )
+            .0
+            .len(),
+            600
+        );
     }
 
     #[test]

@@ -25,11 +25,17 @@ impl std::error::Error for Explained {}
 /// Puts an error into terms of the command line.
 pub fn explain(error: &Error) -> Explained {
     let message = match &error.argument {
-        Some(Argument { name, value: Some(value) }) => format!("{} {value}: {}", option(name), error.message),
+        Some(Argument {
+            name,
+            value: Some(value),
+        }) => format!("{} {value}: {}", option(name), error.message),
         Some(Argument { name, value: None }) => format!("{}: {}", option(name), error.message),
         None => error.message.clone(),
     };
-    Explained { message, hint: hint(&error.remedies) }
+    Explained {
+        message,
+        hint: hint(&error.remedies),
+    }
 }
 
 /// Joins remedies into one sentence: "resume it with --resume, or write elsewhere with --out".
@@ -39,8 +45,10 @@ fn hint(remedies: &[Remedy]) -> Option<String> {
         [.., _, last @ (Remedy::Repeat | Remedy::RepeatResuming)] => (Some(words(last)), true),
         _ => (None, false),
     };
-    let alternatives: Vec<String> =
-        remedies[..remedies.len() - usize::from(is_then)].iter().map(words).collect();
+    let alternatives: Vec<String> = remedies[..remedies.len() - usize::from(is_then)]
+        .iter()
+        .map(words)
+        .collect();
     let text = match alternatives.as_slice() {
         [] => return None,
         [one] => one.clone(),
@@ -69,7 +77,9 @@ fn words(remedy: &Remedy) -> String {
         }
         Remedy::TakeUnphysical => "leave --physical-only out to take it all the same".to_string(),
         Remedy::NameData => "name the folder of the images with --data".to_string(),
-        Remedy::UseBuiltin => "use the digits that the program draws with --dataset builtin".to_string(),
+        Remedy::UseBuiltin => {
+            "use the digits that the program draws with --dataset builtin".to_string()
+        }
         Remedy::ShowOtherDataset => "show another dataset's images with --dataset NAME".to_string(),
         Remedy::DrawTrainingImages => {
             "let --set data.train_images= draw images of the task's classes by the seed".to_string()
@@ -78,7 +88,9 @@ fn words(remedy: &Remedy) -> String {
         Remedy::MeasureWithSeed(seed) => format!("measure with --seed {seed}"),
         Remedy::LeaveOutRollouts => "leave out the moving pictures with --rollouts 0".to_string(),
         Remedy::NameMirror => "name another mirror with --mirror".to_string(),
-        Remedy::ChoosePort => "name another with --port, or leave it out to take a free one".to_string(),
+        Remedy::ChoosePort => {
+            "name another with --port, or leave it out to take a free one".to_string()
+        }
         Remedy::NameRobot(id) => format!("name one, as in --robot {id}"),
         Remedy::FreeSpace(folder) => {
             format!("make space on the disk that {} is on", folder.display())
@@ -117,7 +129,8 @@ mod tests {
 
     #[test]
     fn arguments_and_remedies_are_spelled_as_they_are_typed() {
-        let error = Error::argument("control_steps", 0, "expected 1 or more").remedy(Remedy::Resume);
+        let error =
+            Error::argument("control_steps", 0, "expected 1 or more").remedy(Remedy::Resume);
         let explained = explain(&error.remedy(Remedy::ChooseOut).remedy(Remedy::Replace));
         assert_eq!(explained.message, "--control-steps 0: expected 1 or more");
         let hint = "go on with it by --resume, write elsewhere with --out, or start anew with --force, which \
@@ -125,9 +138,14 @@ mod tests {
         assert_eq!(explained.hint.as_deref(), Some(hint));
         let full = Error::other("full".to_string()).remedy(Remedy::FreeSpace("a".into()));
         let hint = "make space on the disk that a is on; then the same command goes on";
-        assert_eq!(explain(&full.remedy(Remedy::Repeat)).hint.as_deref(), Some(hint));
         assert_eq!(
-            explain(&Error::other("x".to_string()).remedy(Remedy::Repeat)).hint.unwrap(),
+            explain(&full.remedy(Remedy::Repeat)).hint.as_deref(),
+            Some(hint)
+        );
+        assert_eq!(
+            explain(&Error::other("x".to_string()).remedy(Remedy::Repeat))
+                .hint
+                .unwrap(),
             "the same command goes on"
         );
         assert_eq!(explain(&Error::other("x".to_string())).hint, None);
@@ -135,9 +153,19 @@ mod tests {
 
     #[test]
     fn commands_are_spelled_for_a_shell() {
-        let invocation = Invocation::new("train").option("archive", Path::new("a b")).option("task", "4|9");
-        assert_eq!(spell(&invocation), "morphcog train --archive 'a b' --task '4|9'");
-        let fetch = Invocation::new("data fetch").value("mnist").option("to", Value::Placeholder("DIR"));
-        assert_eq!(spell(&fetch.switch("force", true)), "morphcog data fetch mnist --to DIR --force");
+        let invocation = Invocation::new("train")
+            .option("archive", Path::new("a b"))
+            .option("task", "4|9");
+        assert_eq!(
+            spell(&invocation),
+            "morphcog train --archive 'a b' --task '4|9'"
+        );
+        let fetch = Invocation::new("data fetch")
+            .value("mnist")
+            .option("to", Value::Placeholder("DIR"));
+        assert_eq!(
+            spell(&fetch.switch("force", true)),
+            "morphcog data fetch mnist --to DIR --force"
+        );
     }
 }

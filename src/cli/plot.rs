@@ -84,7 +84,14 @@ pub(super) struct PlotArgs {
 }
 
 pub(super) fn run(args: PlotArgs, console: &Console) -> Result<(), Error> {
-    let PlotArgs { kind, physical_only, images, data, dataset, .. } = args;
+    let PlotArgs {
+        kind,
+        physical_only,
+        images,
+        data,
+        dataset,
+        ..
+    } = args;
     let archives = args.archives.paths();
     // What is wrong with the file is to be known before robots are searched for.
     plot::endings(args.out.as_deref())?;
@@ -97,7 +104,12 @@ pub(super) fn run(args: PlotArgs, console: &Console) -> Result<(), Error> {
         robots => {
             let robots = robots.unwrap_or(Selection::Ids(vec![BEST.to_string()]));
             let archives = archives.clone();
-            let search = one_by_one::RobotChoice { robots, archives, physical_only, seed: args.seed };
+            let search = one_by_one::RobotChoice {
+                robots,
+                archives,
+                physical_only,
+                seed: args.seed,
+            };
             choice::one_by_one(&search, data.clone(), console)?
         }
     };
@@ -105,14 +117,26 @@ pub(super) fn run(args: PlotArgs, console: &Console) -> Result<(), Error> {
         kind,
         archives,
         robots,
-        options: ReplayOptions { physical_only, images, data, dataset, ..ReplayOptions::default() },
+        options: ReplayOptions {
+            physical_only,
+            images,
+            data,
+            dataset,
+            ..ReplayOptions::default()
+        },
         every: args.every.map_or(0, |steps| steps as usize),
         out: args.out,
         dpi: args.dpi,
-        background: if args.transparent { Background::Transparent } else { Background::Paper },
+        background: if args.transparent {
+            Background::Transparent
+        } else {
+            Background::Paper
+        },
     };
     let made = plot::plot(&wanted, &Session::new(&NEVER, &Reporter::new(console)))?;
-    made.files.iter().for_each(|path| console.line_about(path, &format!("wrote {}", path.display())));
+    made.files
+        .iter()
+        .for_each(|path| console.line_about(path, &format!("wrote {}", path.display())));
     sweeps::differences(console, &made.progress);
     Ok(())
 }

@@ -79,7 +79,10 @@ fn failed_among(ranks: Ranks, error: &Error) -> ! {
     if !ranks.leads() {
         std::thread::sleep(LEAD_SPEAKS);
         let error = error.clone().in_place(&format!("rank {}", ranks.rank()));
-        Console::new(Mode::Human).failed(&Error { remedies: Vec::new(), ..error });
+        Console::new(Mode::Human).failed(&Error {
+            remedies: Vec::new(),
+            ..error
+        });
     }
     ranks.abort(error.kind.exit_code())
 }
@@ -88,10 +91,15 @@ fn failed_among(ranks: Ranks, error: &Error) -> ! {
 fn say(help: &clap::Error, arguments: &[OsString]) -> u8 {
     let code = u8::try_from(help.exit_code()).unwrap_or(2);
     // File names that a shell inserted may have hidden characters.
-    let hides_any = arguments.iter().any(|argument| argument.to_string_lossy().contains(is_unseen));
+    let hides_any = arguments
+        .iter()
+        .any(|argument| argument.to_string_lossy().contains(is_unseen));
     if help.use_stderr() && hides_any {
         let text = help.to_string();
-        Console::new(Mode::Human).error(&io::Error::other(text.trim_start_matches("error: ").trim()), None);
+        Console::new(Mode::Human).error(
+            &io::Error::other(text.trim_start_matches("error: ").trim()),
+            None,
+        );
         return code;
     }
     if help.use_stderr() {

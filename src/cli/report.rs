@@ -57,14 +57,28 @@ pub(super) fn run(args: ReportArgs, console: &Console) -> Result<(), Error> {
         0 => choice::say_unfinished(&archives, console),
         _ => choice::say_simulated(&archives, console),
     }
-    let out = args.out.unwrap_or_else(|| folder::beside_all(&archives, "report.html"));
+    let out = args
+        .out
+        .unwrap_or_else(|| folder::beside_all(&archives, "report.html"));
     folder::writable(&out)?;
-    let gathered =
-        dossier::gather(&archives, args.data.as_deref(), args.rollouts > 0, &|text| console.warning(text))?;
+    let gathered = dossier::gather(
+        &archives,
+        args.data.as_deref(),
+        args.rollouts > 0,
+        &|text| console.warning(text),
+    )?;
     let rollouts = args.rollouts.div_ceil(archives.len());
-    let content = Content { gathered: &gathered, rollouts, spell: &spell };
+    let content = Content {
+        gathered: &gathered,
+        rollouts,
+        spell: &spell,
+    };
     let page = {
-        let counter = console.counter("simulating for the page:", content.count() as u64, "rollouts");
+        let counter = console.counter(
+            "simulating for the page:",
+            content.count() as u64,
+            "rollouts",
+        );
         content.page(&|simulated| counter.update(simulated))
     };
     let page = page?;

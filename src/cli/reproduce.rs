@@ -55,14 +55,32 @@ pub(super) struct ReproduceArgs {
 pub(super) fn run(args: ReproduceArgs, console: &Console) -> Result<(), Error> {
     let plan = PaperPlan::load(&args.plan, &args.set)?;
     let tasks = reproduce::tasks(&plan, args.scale)?;
-    let place = TaskFolders { out: args.out.clone() };
-    let name = if PaperPlan::is_built_in(&args.plan) { args.plan.clone() } else { absolute(&args.plan)? };
-    let mut words = ["reproduce", &name, "--scale", &args.scale.to_string()].map(quoted).to_vec();
-    words.extend(args.set.iter().flat_map(|set| ["--set".to_string(), quoted(set)]));
+    let place = TaskFolders {
+        out: args.out.clone(),
+    };
+    let name = if PaperPlan::is_built_in(&args.plan) {
+        args.plan.clone()
+    } else {
+        absolute(&args.plan)?
+    };
+    let mut words = ["reproduce", &name, "--scale", &args.scale.to_string()]
+        .map(quoted)
+        .to_vec();
+    words.extend(
+        args.set
+            .iter()
+            .flat_map(|set| ["--set".to_string(), quoted(set)]),
+    );
     if asked(
         &args.what,
         &tasks,
-        &Command { words, name: "reproduce", tasks: &tasks, place: &place, with: &args.place },
+        &Command {
+            words,
+            name: "reproduce",
+            tasks: &tasks,
+            place: &place,
+            with: &args.place,
+        },
         console,
     )? {
         if args.what.list || args.what.slurm {
@@ -72,8 +90,15 @@ pub(super) fn run(args: ReproduceArgs, console: &Console) -> Result<(), Error> {
         return Ok(());
     }
     let jobs = args.place.jobs.map(usize::from);
-    let options = ReproduceOptions { plan, scale: args.scale, place, jobs };
-    let finished = in_session(console, args.place.with(), |session| reproduce::reproduce(&options, session))?;
+    let options = ReproduceOptions {
+        plan,
+        scale: args.scale,
+        place,
+        jobs,
+    };
+    let finished = in_session(console, args.place.with(), |session| {
+        reproduce::reproduce(&options, session)
+    })?;
     ended(&finished.runs, tasks.len())?;
     if finished.stopped {
         let text = "stopped; what is done so far is kept".to_string();

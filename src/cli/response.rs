@@ -84,7 +84,9 @@ pub(super) struct ResponseArgs {
 pub(super) fn run(args: ResponseArgs, console: &Console) -> Result<(), Error> {
     let robots = selected(args.robots)?.unwrap_or(Selection::Ids(vec![BEST.to_string()]));
     let (archives, robots) = robots::archives(args.archive.into_iter().collect(), robots)?;
-    let [archive] = archives.try_into().expect("one is named, or else there is one");
+    let [archive] = archives
+        .try_into()
+        .expect("one is named, or else there is one");
     let search = one_by_one::RobotChoice {
         robots,
         archives: vec![archive.clone()],
@@ -92,9 +94,14 @@ pub(super) fn run(args: ResponseArgs, console: &Console) -> Result<(), Error> {
         seed: args.seed.unwrap_or(1),
     };
     let robots = choice::one_by_one(&search, args.data.clone(), console)?;
-    let out = args.out.unwrap_or_else(|| folder::beside(&archive, RESPONSE_JSON));
+    let out = args
+        .out
+        .unwrap_or_else(|| folder::beside(&archive, RESPONSE_JSON));
     let options = ResponseOptions {
-        robots: robots.into_iter().map(|Named { robot, .. }| robot).collect(),
+        robots: robots
+            .into_iter()
+            .map(|Named { robot, .. }| robot)
+            .collect(),
         physical_only: args.physical_only,
         task: args.task,
         set: args.set,
@@ -105,7 +112,9 @@ pub(super) fn run(args: ResponseArgs, console: &Console) -> Result<(), Error> {
         archive,
     };
     let with = Resources::of(args.threads, args.data);
-    let finished = in_session(console, with, |session| response::measure(&options, session))?;
+    let finished = in_session(console, with, |session| {
+        response::measure(&options, session)
+    })?;
     responses::response(console, &finished, &options.out);
     if let Some(error) = finished.unwritten {
         return Err(error);
@@ -118,7 +127,10 @@ pub(super) fn run(args: ResponseArgs, console: &Console) -> Result<(), Error> {
             }
             0 => "stopped within the first robot; what was measured is saved".to_string(),
             robots => {
-                format!("stopped after {}", counted(robots, "robot; it is saved", "robots; those are saved"))
+                format!(
+                    "stopped after {}",
+                    counted(robots, "robot; it is saved", "robots; those are saved")
+                )
             }
         };
         return Err(Error::stopped(text));

@@ -50,11 +50,21 @@ pub(super) struct ServeArgs {
 pub(super) fn run(args: ServeArgs, console: &Console) -> Result<(), Error> {
     let archives = args.archives.paths();
     // Without a run, the page still has the published robots.
-    let newest = if archives.is_empty() { folder::newest_run().ok() } else { None };
+    let newest = if archives.is_empty() {
+        folder::newest_run().ok()
+    } else {
+        None
+    };
     let stop = signals::stop_flag()?;
     let shown: Vec<_> = archives.iter().chain(&newest).cloned().collect();
     let hosts = Hosts::new(args.allow_host, ADVICE);
-    let options = ServeOptions { archives, newest, data: args.data, runs: folder::RUNS.into(), hosts };
+    let options = ServeOptions {
+        archives,
+        newest,
+        data: args.data,
+        runs: folder::RUNS.into(),
+        hosts,
+    };
     let (service, notes) = Service::open(&options)?;
     let server = Server::bind(service, args.port)?;
     choice::warn_of_versions(&shown, console);

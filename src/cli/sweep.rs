@@ -69,17 +69,34 @@ pub(super) struct SweepArgs {
 
 pub(super) fn run(args: SweepArgs, console: &Console) -> Result<(), Error> {
     let plan = SweepPlan::load(&args.plan, &args.set)?;
-    let tasks = plan.tasks(&args.plan).map_err(|errors| refused(errors, console))?;
-    let name = args.plan.file_stem().map_or("sweep".to_string(), |stem| stem.to_string_lossy().into_owned());
-    let out = args.out.unwrap_or_else(|| Path::new(folder::RUNS).join(&name));
+    let tasks = plan
+        .tasks(&args.plan)
+        .map_err(|errors| refused(errors, console))?;
+    let name = args.plan.file_stem().map_or("sweep".to_string(), |stem| {
+        stem.to_string_lossy().into_owned()
+    });
+    let out = args
+        .out
+        .unwrap_or_else(|| Path::new(folder::RUNS).join(&name));
     let place = TaskFolders { out: out.clone() };
-    let absolute = std::path::absolute(&args.plan).map_err(|error| Error::reading(&args.plan, &error))?;
+    let absolute =
+        std::path::absolute(&args.plan).map_err(|error| Error::reading(&args.plan, &error))?;
     let mut words = vec!["sweep".to_string(), in_shell(&absolute)];
-    words.extend(args.set.iter().flat_map(|set| ["--set".to_string(), quoted(set)]));
+    words.extend(
+        args.set
+            .iter()
+            .flat_map(|set| ["--set".to_string(), quoted(set)]),
+    );
     if asked(
         &args.what,
         &tasks,
-        &Command { words, name: &name, tasks: &tasks, place: &place, with: &args.place },
+        &Command {
+            words,
+            name: &name,
+            tasks: &tasks,
+            place: &place,
+            with: &args.place,
+        },
         console,
     )? {
         return Ok(());
@@ -93,10 +110,18 @@ pub(super) fn run(args: SweepArgs, console: &Console) -> Result<(), Error> {
     }
     warn_of_gaits(&tasks, console);
     let jobs = args.place.jobs.map(usize::from);
-    let summary =
-        in_session(console, args.place.with(), |session| tasks::run_all(&tasks, &place, jobs, session))?;
+    let summary = in_session(console, args.place.with(), |session| {
+        tasks::run_all(&tasks, &place, jobs, session)
+    })?;
     ended(&summary, tasks.len())?;
-    console.line(&format!("{} done, in {}", counted(tasks.len(), "task is", "tasks are"), out.display()));
-    console.suggest("next:", &format!("morphcog sweep {} --collect", in_shell(&args.plan)));
+    console.line(&format!(
+        "{} done, in {}",
+        counted(tasks.len(), "task is", "tasks are"),
+        out.display()
+    ));
+    console.suggest(
+        "next:",
+        &format!("morphcog sweep {} --collect", in_shell(&args.plan)),
+    );
     Ok(())
 }

@@ -82,7 +82,8 @@ impl Command<'_> {
     /// Returns the whole command without its number of threads, independent of the present folder
     /// and of variables.
     fn line(&self) -> Result<String, Error> {
-        let absolute = |path: &Path| std::path::absolute(path).map_err(|error| Error::reading(path, &error));
+        let absolute =
+            |path: &Path| std::path::absolute(path).map_err(|error| Error::reading(path, &error));
         let own = || std::env::current_exe().map_err(|error| Error::other(error.to_string()));
         let mut words = vec![match process::program() {
             Some(words) => words.to_string(),
@@ -90,15 +91,25 @@ impl Command<'_> {
         }];
         words.extend(self.words.iter().cloned());
         words.extend(["--out".to_string(), in_shell(&absolute(&self.place.out)?)]);
-        let environment =
-            std::env::var_os("MORPHCOG_DATA").filter(|value| !value.is_empty()).map(PathBuf::from);
-        if let Some(data) = self.with.data.clone().or(environment).or_else(|| self.data_here()) {
+        let environment = std::env::var_os("MORPHCOG_DATA")
+            .filter(|value| !value.is_empty())
+            .map(PathBuf::from);
+        if let Some(data) = self
+            .with
+            .data
+            .clone()
+            .or(environment)
+            .or_else(|| self.data_here())
+        {
             words.extend(["--data".to_string(), in_shell(&absolute(&data)?)]);
         }
         if let Some(atlas) = self.tasks.iter().find_map(Task::atlas) {
             words.splice(
                 0..0,
-                ["env".to_string(), format!("{}={}", atlas::VARIABLE, in_shell(&absolute(&atlas)?))],
+                [
+                    "env".to_string(),
+                    format!("{}={}", atlas::VARIABLE, in_shell(&absolute(&atlas)?)),
+                ],
             );
         }
         Ok(words.join(" "))
@@ -114,8 +125,9 @@ impl Command<'_> {
 
     fn list(&self, count: usize, console: &Console) -> Result<(), Error> {
         let (line, threads) = (self.line()?, self.with.threads.unwrap_or(1));
-        (1..=count)
-            .for_each(|number| console.command(&format!("{line} --threads {threads} --task {number}")));
+        (1..=count).for_each(|number| {
+            console.command(&format!("{line} --threads {threads} --task {number}"))
+        });
         Ok(())
     }
 
@@ -127,8 +139,14 @@ impl Command<'_> {
         let (name, line, threads) = (self.name, self.line()?, self.with.threads.unwrap_or(1));
         let (name, log) = (quoted(name), out.join("slurm-%a.log"));
         // Slurm reads these lines itself, without a shell's escapes.
-        if [name.as_str(), &in_shell(&log)].iter().any(|word| word.starts_with('$')) {
-            let text = format!("--slurm: {}: expected names of plan and folder that are text", log.display());
+        if [name.as_str(), &in_shell(&log)]
+            .iter()
+            .any(|word| word.starts_with('$'))
+        {
+            let text = format!(
+                "--slurm: {}: expected names of plan and folder that are text",
+                log.display()
+            );
             return Err(Error::usage(text).advice("rename them, or use --list"));
         }
         let first = count.min(MOST_OF_AN_ARRAY);
@@ -183,7 +201,9 @@ exit "$code"
 
 /// Reports every error but the last, which is left to `main`.
 pub(super) fn refused(mut errors: Vec<Error>, console: &Console) -> Error {
-    let last = errors.pop().expect("something is refused, and it is said what");
+    let last = errors
+        .pop()
+        .expect("something is refused, and it is said what");
     errors.iter().for_each(|error| console.failed(error));
     last
 }
@@ -207,13 +227,23 @@ pub(super) fn asked(
     if let Some(number) = what.task {
         let number = number.map_or_else(from_engine, Ok)?;
         let Some(task) = number.checked_sub(1).and_then(|index| tasks.get(index)) else {
-            let text = format!("--task {number}: expected a number from 1 to {}", tasks.len());
+            let text = format!(
+                "--task {number}: expected a number from 1 to {}",
+                tasks.len()
+            );
             return Err(Error::usage(text));
         };
-        tasks::check_folders(std::slice::from_ref(task), place).map_err(|errors| refused(errors, console))?;
-        tasks::check_data(std::iter::once((number, task)), place, command.with.data.as_deref())?;
+        tasks::check_folders(std::slice::from_ref(task), place)
+            .map_err(|errors| refused(errors, console))?;
+        tasks::check_data(
+            std::iter::once((number, task)),
+            place,
+            command.with.data.as_deref(),
+        )?;
         warn_of_gaits(std::slice::from_ref(task), console);
-        in_session(console, command.with.with(), |session| tasks::run(task, place, session))?;
+        in_session(console, command.with.with(), |session| {
+            tasks::run(task, place, session)
+        })?;
         console.line(&format!("task {number} ({}): done", task.name));
     } else if what.list {
         command.list(tasks.len(), console)?;
@@ -230,12 +260,20 @@ pub(super) fn asked(
 
 /// Returns the number that an engine gave to this process.
 fn from_engine() -> Result<usize, Error> {
-    let given = NUMBERS.iter().find_map(|name| Some((name, std::env::var(name).ok()?)));
+    let given = NUMBERS
+        .iter()
+        .find_map(|name| Some((name, std::env::var(name).ok()?)));
     let Some((name, value)) = given else {
-        let text = format!("--task: expected a number, or one of {} to be set", NUMBERS.join(", "));
+        let text = format!(
+            "--task: expected a number, or one of {} to be set",
+            NUMBERS.join(", ")
+        );
         return Err(Error::usage(text));
     };
-    value.trim().parse().map_err(|_| Error::usage(format!("{name}={value}: expected the number of a task")))
+    value
+        .trim()
+        .parse()
+        .map_err(|_| Error::usage(format!("{name}={value}: expected the number of a task")))
 }
 
 /// Reports how all tasks ended.
@@ -243,12 +281,18 @@ fn from_engine() -> Result<usize, Error> {
 /// # Errors
 /// Returns an error if some failed or were stopped.
 pub(super) fn ended(summary: &TasksSummary, count: usize) -> Result<(), Error> {
-    let TasksSummary { done, failed, elsewhere, open } = summary;
+    let TasksSummary {
+        done,
+        failed,
+        elsewhere,
+        open,
+    } = summary;
     if !failed.is_empty() {
         let numbers: Vec<String> = failed.iter().map(usize::to_string).collect();
         let (count_failed, numbers) = (failed.len(), numbers.join(", "));
-        let text =
-            format!("{count_failed} of {count} tasks failed: {numbers}; {done} are done, {open} are open");
+        let text = format!(
+            "{count_failed} of {count} tasks failed: {numbers}; {done} are done, {open} are open"
+        );
         return Err(Error::other(text).advice("the same command tries them again"));
     }
     if *open == 0 && *elsewhere > 0 {

@@ -77,7 +77,11 @@ pub(super) fn run(args: TeamArgs, console: &Console) -> Result<(), Error> {
     let mut archives = args.archives.paths();
     if archives.is_empty() {
         archives = folder::run_json(PathBuf::from(gallery::TEAM)).map_err(Error::other)?;
-        console.line(&format!("no --archive: the {} robots of {}", archives.len(), gallery::TEAM));
+        console.line(&format!(
+            "no --archive: the {} robots of {}",
+            archives.len(),
+            gallery::TEAM
+        ));
     }
     choice::say_simulated(&archives, console);
     let options = TeamOptions {
@@ -86,13 +90,19 @@ pub(super) fn run(args: TeamArgs, console: &Console) -> Result<(), Error> {
         images: args.images,
         split: args.split,
         seed: args.seed,
-        out: args.out.unwrap_or_else(|| folder::beside_all(&archives, team::own_name(args.split))),
+        out: args
+            .out
+            .unwrap_or_else(|| folder::beside_all(&archives, team::own_name(args.split))),
         archives,
     };
     let with = Resources::of(args.threads, args.data);
     let team::TeamOutcome { file, unwritten } =
         in_session(console, with, |session| team::team(&options, session))?;
-    teams::team(console, &file, unwritten.is_none().then_some(options.out.as_path()))?;
+    teams::team(
+        console,
+        &file,
+        unwritten.is_none().then_some(options.out.as_path()),
+    )?;
     if let Some(error) = unwritten {
         return Err(error);
     }

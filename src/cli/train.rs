@@ -86,7 +86,10 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
         true => Some(Path::new(folder::RUNS)),
         false => archive.parent().and_then(|folder| folder.parent()),
     };
-    let out = args.out.or(beside.map(|folder| folder.join(&name))).unwrap_or_else(|| PathBuf::from(&name));
+    let out = args
+        .out
+        .or(beside.map(|folder| folder.join(&name)))
+        .unwrap_or_else(|| PathBuf::from(&name));
     let if_exists = match (args.resume, args.force) {
         (true, _) => IfExists::Resume,
         (_, true) => IfExists::Overwrite,
@@ -110,7 +113,10 @@ const GAITS: usize = 4;
 
 /// Returns the name of a training: the archive's folder and the task.
 fn name(archive: &Path, [a, b]: &[Vec<u8>; 2], seed: Option<u64>) -> String {
-    let folder = archive.parent().and_then(Path::file_name).map(|name| name.to_string_lossy());
+    let folder = archive
+        .parent()
+        .and_then(Path::file_name)
+        .map(|name| name.to_string_lossy());
     let of = match shipped::name(archive) {
         Some((_, name)) => name,
         None => folder.as_deref().unwrap_or("run"),
@@ -128,7 +134,12 @@ pub(super) fn after_evolution(
     evolution: &evolve::EvolveOptions,
     session: &Session,
 ) -> Result<TrainOptions, Error> {
-    let evolve::EvolveOptions { config, out, if_exists, .. } = evolution;
+    let evolve::EvolveOptions {
+        config,
+        out,
+        if_exists,
+        ..
+    } = evolution;
     if session.ranks.size() > 1 {
         let text = "--train: expected one process: several cannot share a training".to_string();
         return Err(Error::usage(text).advice("evolve first, then morphcog train without mpirun"));
@@ -159,9 +170,15 @@ pub(super) fn after_evolution(
 }
 
 /// Trains, validates and audits, and reports the results.
-pub(super) fn trained(options: &TrainOptions, with: Resources, console: &Console) -> Result<(), Error> {
+pub(super) fn trained(
+    options: &TrainOptions,
+    with: Resources,
+    console: &Console,
+) -> Result<(), Error> {
     choice::say_simulated([&options.archive], console);
-    let finished = in_session(console, with.clone(), |session| train::train(options, session))?;
+    let finished = in_session(console, with.clone(), |session| {
+        train::train(options, session)
+    })?;
     let TrainOutcome { validated, .. } = &finished;
     summary::training(console, &finished, &options.out);
     let Some(validated) = validated else {
@@ -186,9 +203,14 @@ pub(super) fn trained(options: &TrainOptions, with: Resources, console: &Console
         return Err(error);
     }
     if audited.stopped {
-        return Err(Error::stopped("stopped while auditing; the run is saved".to_string())
-            .remedy(Remedy::RepeatResuming));
+        return Err(
+            Error::stopped("stopped while auditing; the run is saved".to_string())
+                .remedy(Remedy::RepeatResuming),
+        );
     }
-    console.suggest("next:", &format!("morphcog eval --archive {}", in_shell(&archive)));
+    console.suggest(
+        "next:",
+        &format!("morphcog eval --archive {}", in_shell(&archive)),
+    );
     Ok(())
 }

@@ -14,7 +14,10 @@ pub(super) fn offering<P: TypedValueParser>(
     words: impl IntoIterator<Item = &'static str>,
     parser: P,
 ) -> Offering<P> {
-    Offering { words: words.into_iter().collect(), parser }
+    Offering {
+        words: words.into_iter().collect(),
+        parser,
+    }
 }
 
 /// Parser that [`offering`] returns.
@@ -56,10 +59,12 @@ where
 {
     move |text: &str| {
         let number = text.parse().ok().filter(|number| range.contains(number));
-        number.and_then(|number| T::try_from(number).ok()).ok_or_else(|| {
-            let (least, most) = (range.start(), range.end());
-            format!("expected a whole number from {least} to {most}")
-        })
+        number
+            .and_then(|number| T::try_from(number).ok())
+            .ok_or_else(|| {
+                let (least, most) = (range.start(), range.end());
+                format!("expected a whole number from {least} to {most}")
+            })
     }
 }
 
@@ -87,7 +92,9 @@ pub(super) fn with_negative_numbers(command: Command) -> Command {
         true => argument.allow_negative_numbers(true),
         false => argument,
     };
-    command.mut_args(allowing).mut_subcommands(with_negative_numbers)
+    command
+        .mut_args(allowing)
+        .mut_subcommands(with_negative_numbers)
 }
 
 #[cfg(test)]
@@ -100,23 +107,46 @@ mod tests {
     fn said(line: &str) -> String {
         let command = with_negative_numbers(Cli::command());
         let words = std::iter::once("morphcog").chain(line.split_whitespace());
-        command.try_get_matches_from(words).map_or_else(|error| error.to_string(), |_| String::new())
+        command
+            .try_get_matches_from(words)
+            .map_or_else(|error| error.to_string(), |_| String::new())
     }
 
     #[test]
     fn numbers_that_are_none_or_out_of_range_say_which_are_expected() {
         for (line, expected) in [
-            ("evolve --generations 1e9", "'--generations <GENERATIONS>': expected a whole number from 1 to"),
-            ("evolve --seed -1", "'--seed <SEED>': expected a whole number from 0 to"),
-            ("eval --seed 1.5", "'--seed <SEED>': expected a whole number from 0 to"),
+            (
+                "evolve --generations 1e9",
+                "'--generations <GENERATIONS>': expected a whole number from 1 to",
+            ),
+            (
+                "evolve --seed -1",
+                "'--seed <SEED>': expected a whole number from 0 to",
+            ),
+            (
+                "eval --seed 1.5",
+                "'--seed <SEED>': expected a whole number from 0 to",
+            ),
             (
                 "replay --width 4294967296",
                 "'--width <WIDTH>': expected a whole number from 0 to 4294967295\n",
             ),
-            ("eval --threads 0", "'--threads <THREADS>': expected a whole number from 1 to"),
-            ("eval --threshold far", "'--threshold <THRESHOLD>': expected a number, such as 0.5\n"),
-            ("reproduce --scale nan", "'--scale <SCALE>': expected a number, such as 0.5\n"),
-            ("serve --port 65536", "'--port <PORT>': expected a whole number from 0 to 65535\n"),
+            (
+                "eval --threads 0",
+                "'--threads <THREADS>': expected a whole number from 1 to",
+            ),
+            (
+                "eval --threshold far",
+                "'--threshold <THRESHOLD>': expected a number, such as 0.5\n",
+            ),
+            (
+                "reproduce --scale nan",
+                "'--scale <SCALE>': expected a number, such as 0.5\n",
+            ),
+            (
+                "serve --port 65536",
+                "'--port <PORT>': expected a whole number from 0 to 65535\n",
+            ),
         ] {
             assert!(said(line).contains(expected), "{line}: {}", said(line));
         }

@@ -99,22 +99,46 @@ struct Trial {
 /// # Errors
 /// Returns an error if the archive, data, selection or criteria are wrong.
 pub fn audit(options: &AuditOptions, session: &Session) -> Result<AuditOutcome, Error> {
-    let Opened { config, fitness, training, subjects, order, mut file } = open(options, session)?;
+    let Opened {
+        config,
+        fitness,
+        training,
+        subjects,
+        order,
+        mut file,
+    } = open(options, session)?;
     let grouping = config.grouping()?.with_fitness(fitness);
-    let trial = Trial { grouping, training, criteria: options.criteria.clone(), config };
+    let trial = Trial {
+        grouping,
+        training,
+        criteria: options.criteria.clone(),
+        config,
+    };
     if let Some(earlier) = replaced::<AuditFile>(&options.out)?
         && earlier.run_sha256 == file.run_sha256
         && earlier.criteria != file.criteria
     {
-        let count = counted(earlier.robots.len(), "robot of this run is", "robots of this run are");
-        let text = format!("{}: {count} audited by other criteria", options.out.display());
-        return Err(Error::input(text).remedy(Remedy::ChooseOut).remedy(Remedy::MoveAway));
+        let count = counted(
+            earlier.robots.len(),
+            "robot of this run is",
+            "robots of this run are",
+        );
+        let text = format!(
+            "{}: {count} audited by other criteria",
+            options.out.display()
+        );
+        return Err(Error::input(text)
+            .remedy(Remedy::ChooseOut)
+            .remedy(Remedy::MoveAway));
     }
     file.add_known(&options.out);
     let mut shipped = None;
     if options.out == folder::beside(&options.archive, AUDIT_JSON) {
         // Verdicts that came with a named run; for other runs, this is the same file.
-        let (with_it, before) = (options.archive.with_file_name(AUDIT_JSON), file.robots.len());
+        let (with_it, before) = (
+            options.archive.with_file_name(AUDIT_JSON),
+            file.robots.len(),
+        );
         file.add_known(&with_it);
         shipped = Some(with_it).filter(|_| file.robots.len() > before);
     }
@@ -122,21 +146,34 @@ pub fn audit(options: &AuditOptions, session: &Session) -> Result<AuditOutcome, 
     let is_open = |subject: &Subject| options.fresh || file.robot(&subject.id).is_none();
     let open: Vec<Subject> = subjects.into_iter().filter(is_open).collect();
     let known = asked.len() - open.len();
-    let rollouts: usize = open.iter().map(|subject| 1 + trial.perturbations(subject).len()).sum();
+    let rollouts: usize = open
+        .iter()
+        .map(|subject| 1 + trial.perturbations(subject).len())
+        .sum();
     let rollouts = rollouts.div_ceil(session.ranks.size());
     let label = format!("auditing {}:", counted(open.len(), "robot", "robots"));
-    session.observer.begins(&Work::new(label, rollouts as u64, "rollouts"));
+    session
+        .observer
+        .begins(&Work::new(label, rollouts as u64, "rollouts"));
     let pool = session.pool()?;
     let done = AtomicU64::new(0);
     let mut unwritten = Unwritten::default();
     let ranks = session.ranks;
     for batch in open.chunks(BATCH * ranks.size()) {
-        let own = batch.par_iter().enumerate().filter(|(place, _)| place % ranks.size() == ranks.rank());
-        let own: Vec<Option<RobotAudit>> =
-            pool.install(|| own.map(|(_, subject)| trial.robot(subject, session, &done)).collect());
+        let own = batch
+            .par_iter()
+            .enumerate()
+            .filter(|(place, _)| place % ranks.size() == ranks.rank());
+        let own: Vec<Option<RobotAudit>> = pool.install(|| {
+            own.map(|(_, subject)| trial.robot(subject, session, &done))
+                .collect()
+        });
         let mut shares: Vec<_> = ranks.share(own).into_iter().map(Vec::into_iter).collect();
-        let next =
-            |place: usize| shares[place % ranks.size()].next().expect("a rank audits all of its share");
+        let next = |place: usize| {
+            shares[place % ranks.size()]
+                .next()
+                .expect("a rank audits all of its share")
+        };
         let found: Vec<Option<RobotAudit>> = (0..batch.len()).map(next).collect();
         let stopped = found.iter().any(Option::is_none);
         for (subject, found) in batch.iter().zip(&found) {
@@ -152,18 +189,33 @@ pub fn audit(options: &AuditOptions, session: &Session) -> Result<AuditOutcome, 
         }
         // Another audit of this run may have written meanwhile.
         file.add_known(&options.out);
-        file.robots.sort_by_key(|robot| order.iter().position(|id| *id == robot.id));
+        file.robots
+            .sort_by_key(|robot| order.iter().position(|id| *id == robot.id));
         if ranks.leads() && !file.robots.is_empty() {
             unwritten.tried(file.write(&options.out), session)?;
         }
         if stopped {
-            return Ok(AuditOutcome { file, asked, known, shipped, stopped, unwritten: unwritten.error() });
+            return Ok(AuditOutcome {
+                file,
+                asked,
+                known,
+                shipped,
+                stopped,
+                unwritten: unwritten.error(),
+            });
         }
     }
     if ranks.leads() {
         unwritten.tried(file.write(&options.out), session)?;
     }
-    Ok(AuditOutcome { file, asked, known, shipped, stopped: false, unwritten: unwritten.error() })
+    Ok(AuditOutcome {
+        file,
+        asked,
+        known,
+        shipped,
+        stopped: false,
+        unwritten: unwritten.error(),
+    })
 }
 
 /// The inputs of an audit.
@@ -188,8 +240,9 @@ fn open(options: &AuditOptions, session: &Session) -> Result<Opened, Error> {
     let training = training_of(run, path, &whereabouts)?;
     // A training may have had other conditions than the protocol, which the audit follows;
     // published robots come with their fitness only.
-    let is_known =
-        run.follows_protocol() && training.images == run.training_images && *path != published::archive();
+    let is_known = run.follows_protocol()
+        && training.images == run.training_images
+        && *path != published::archive();
     let subject = |robot: &Robot| Subject {
         id: robot.id.clone(),
         task: robot.task.clone(),
@@ -197,7 +250,10 @@ fn open(options: &AuditOptions, session: &Session) -> Result<Opened, Error> {
         known: is_known.then(|| robot.displacements.clone()),
     };
     let mut subjects: Vec<Subject> = Vec::new();
-    for chosen in options.robots.of(std::slice::from_ref(&source), options.seed)? {
+    for chosen in options
+        .robots
+        .of(std::slice::from_ref(&source), options.seed)?
+    {
         if subjects.iter().all(|other| other.id != chosen.robot.id) {
             subjects.push(subject(chosen.robot));
         }
@@ -205,13 +261,29 @@ fn open(options: &AuditOptions, session: &Session) -> Result<Opened, Error> {
     let order: Vec<String> = run.elites.iter().map(|robot| robot.id.clone()).collect();
     let file = AuditFile::new(&run.name, run.fingerprint(), order.len(), &options.criteria);
     let (config, fitness) = (run.config.clone(), run.fitness());
-    Ok(Opened { config, fitness, training, subjects, order, file })
+    Ok(Opened {
+        config,
+        fitness,
+        training,
+        subjects,
+        order,
+        file,
+    })
 }
 
 /// Returns the first images per class that a run's robots were evolved on. With other data,
 /// verdicts would mean nothing.
-fn training_of(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<TrainingImages, Error> {
-    let dataset = load_dataset_of(Some(&run.dataset), &run.config, whereabouts, &[Split::Train])?;
+fn training_of(
+    run: &RunFile,
+    path: &Path,
+    whereabouts: &Whereabouts,
+) -> Result<TrainingImages, Error> {
+    let dataset = load_dataset_of(
+        Some(&run.dataset),
+        &run.config,
+        whereabouts,
+        &[Split::Train],
+    )?;
     let mut taken = [0; 256];
     let mut images = run.training_images.clone();
     images.retain(|image| {
@@ -221,23 +293,41 @@ fn training_of(run: &RunFile, path: &Path, whereabouts: &Whereabouts) -> Result<
     });
     let see = |image: &crate::store::images::ImageRef| {
         let seen = see(&run.config, &dataset, Split::Train, image.index);
-        seen.map_err(|error| error.in_place("training_images").in_place(&path.display().to_string()))
+        seen.map_err(|error| {
+            error
+                .in_place("training_images")
+                .in_place(&path.display().to_string())
+        })
     };
-    let (dataset, stimuli) = (run.dataset.clone(), images.iter().map(see).collect::<Result<Vec<_>, Error>>());
+    let (dataset, stimuli) = (
+        run.dataset.clone(),
+        images.iter().map(see).collect::<Result<Vec<_>, Error>>(),
+    );
     // As in a test, all rollouts have the same conditions, however the robot was trained.
     let conditions = Vec::new();
-    Ok(TrainingImages { dataset, images, stimuli: stimuli?, conditions })
+    Ok(TrainingImages {
+        dataset,
+        images,
+        stimuli: stimuli?,
+        conditions,
+    })
 }
 
 impl Trial {
     fn perturbations(&self, subject: &Subject) -> Vec<Perturbation> {
-        Perturbation::all(&self.criteria.perturbations, &subject.body, self.config.protocol.rollout)
+        Perturbation::all(
+            &self.criteria.perturbations,
+            &subject.body,
+            self.config.protocol.rollout,
+        )
     }
 
     /// Audits one robot; returns `None` if stopped.
     fn robot(&self, subject: &Subject, session: &Session, done: &AtomicU64) -> Option<RobotAudit> {
         let count = |rollouts: usize| {
-            session.observer.progress(done.fetch_add(rollouts as u64, Ordering::Relaxed) + rollouts as u64);
+            session
+                .observer
+                .progress(done.fetch_add(rollouts as u64, Ordering::Relaxed) + rollouts as u64);
         };
         let setting = PerturbedSetting {
             body: subject.body.clone(),
@@ -246,15 +336,30 @@ impl Trial {
             stimuli: self.training.stimuli.clone(),
         };
         let system = Arc::new(System::new(&setting.body, setting.physics.clone()));
-        let plain =
-            StepError::outcome(walk(&system, &setting.protocol, &setting.stimuli, true, session.stop))
-                .ok()?
-                .ok();
+        let plain = StepError::outcome(walk(
+            &system,
+            &setting.protocol,
+            &setting.stimuli,
+            true,
+            session.stop,
+        ))
+        .ok()?
+        .ok();
         count(1);
-        let (displacements, energy) = plain.map_or((None, Energy::default()), |(d, e)| (Some(d), e));
-        let classes: Vec<u8> = self.training.images.iter().map(|image| image.label).collect();
+        let (displacements, energy) =
+            plain.map_or((None, Energy::default()), |(d, e)| (Some(d), e));
+        let classes: Vec<u8> = self
+            .training
+            .images
+            .iter()
+            .map(|image| image.label)
+            .collect();
         let still = vec![0.0; classes.len()];
-        let split = self.grouping.tasks().iter().find(|split| split.is_called(&subject.task));
+        let split = self
+            .grouping
+            .tasks()
+            .iter()
+            .find(|split| split.is_called(&subject.task));
         // Robots of a run were checked to have one of its tasks.
         let split = split.unwrap_or(&self.grouping.tasks()[0]);
         let behaviour = Behaviour::new(
@@ -276,7 +381,12 @@ impl Trial {
                 let counts = |(rollout, perturbation): &(PerturbedRollout, &Perturbation)| {
                     rollout.displacements.is_some() || perturbation.counts_if_unstable()
                 };
-                rollouts?.into_iter().zip(&perturbations).filter(counts).map(|(rollout, _)| rollout).collect()
+                rollouts?
+                    .into_iter()
+                    .zip(&perturbations)
+                    .filter(counts)
+                    .map(|(rollout, _)| rollout)
+                    .collect()
             }
             false => {
                 session.observer.skips(perturbations.len() as u64);
@@ -295,7 +405,10 @@ impl Trial {
             reason,
             persisting: persisting / rollouts.len().max(1) as f64,
             spread: behaviour.spread(&rollouts),
-            energy_per_cycle: Energy { drive: energy.drive / cycles, limits: energy.limits / cycles },
+            energy_per_cycle: Energy {
+                drive: energy.drive / cycles,
+                limits: energy.limits / cycles,
+            },
             displacements,
             rollouts,
         })
@@ -303,8 +416,16 @@ impl Trial {
 }
 
 /// Returns the displacements in a setting, or `None` if a rollout is unstable.
-fn displacements_in(setting: &PerturbedSetting, session: &Session) -> Result<Option<Vec<f64>>, Stopped> {
-    let PerturbedSetting { body, physics, protocol, stimuli } = setting;
+fn displacements_in(
+    setting: &PerturbedSetting,
+    session: &Session,
+) -> Result<Option<Vec<f64>>, Stopped> {
+    let PerturbedSetting {
+        body,
+        physics,
+        protocol,
+        stimuli,
+    } = setting;
     if protocol.rollout == RolloutMode::Fresh {
         let (found, _) = fresh_rollouts(body, stimuli, &[], (physics, protocol), &|_| (), session)?;
         return Ok(found.into_iter().map(Result::ok).collect());
@@ -328,16 +449,35 @@ mod tests {
 
     /// Two images, of classes 0 (dark) and 1 (bright), each in a fresh rollout of five cycles.
     fn trial(height: usize, width: usize, physics: Physics) -> Trial {
-        let set = ["task={splits=[0,1],same_way_bin=true}", "protocol.control_steps=250"].map(str::to_string);
+        let set = [
+            "task={splits=[0,1],same_way_bin=true}",
+            "protocol.control_steps=250",
+        ]
+        .map(str::to_string);
         let mut config = Config::parse(BUILT_IN[0].1, BUILT_IN[0].0, &set).unwrap();
         config.physics = physics;
         let criteria = Criteria::default();
-        let dataset = DatasetRef { name: "none".to_string(), train_sha256: String::new() };
-        let images = [0, 1].map(|label| ImageRef { index: usize::from(label), label }).to_vec();
-        let stimuli = [0.0, 1.0].map(|pixel| Grid::filled(height, width, pixel)).to_vec();
+        let dataset = DatasetRef {
+            name: "none".to_string(),
+            train_sha256: String::new(),
+        };
+        let images = [0, 1]
+            .map(|label| ImageRef {
+                index: usize::from(label),
+                label,
+            })
+            .to_vec();
+        let stimuli = [0.0, 1.0]
+            .map(|pixel| Grid::filled(height, width, pixel))
+            .to_vec();
         Trial {
             grouping: config.grouping().unwrap(),
-            training: TrainingImages { dataset, images, stimuli, conditions: Vec::new() },
+            training: TrainingImages {
+                dataset,
+                images,
+                stimuli,
+                conditions: Vec::new(),
+            },
             criteria,
             config,
         }
@@ -346,8 +486,15 @@ mod tests {
     fn audited(body: &str, task: &str, physics: Physics) -> RobotAudit {
         let body: Body = body.parse().unwrap();
         let trial = trial(body.height(), body.width(), physics);
-        let subject = Subject { id: "x".to_string(), task: task.to_string(), body, known: None };
-        trial.robot(&subject, &Session::default(), &AtomicU64::new(0)).unwrap()
+        let subject = Subject {
+            id: "x".to_string(),
+            task: task.to_string(),
+            body,
+            known: None,
+        };
+        trial
+            .robot(&subject, &Session::default(), &AtomicU64::new(0))
+            .unwrap()
     }
 
     /// Muscles of opposite phases above and below, a soft front and a rigid foot: it walks right.
@@ -358,7 +505,11 @@ mod tests {
         for task in ["same way", "0|1"] {
             let found = audited("1221/1221", task, Physics::default());
             assert_eq!(found.verdict, Verdict::NotAWalker, "{found:?}");
-            assert!(found.reason.contains("the correct way for 0"), "{}", found.reason);
+            assert!(
+                found.reason.contains("the correct way for 0"),
+                "{}",
+                found.reason
+            );
             assert!(found.rollouts.is_empty() && found.energy_per_cycle.drive == 0.0);
         }
     }
@@ -371,16 +522,30 @@ mod tests {
         assert!(found.displacements.unwrap().iter().all(|d| *d > 5.0));
         assert!(found.spread < 1.0 && found.energy_per_cycle.drive > 0.0);
         // It sees nothing, so it cannot tell classes apart.
-        assert_eq!(audited(WALKER, "0|1", Physics::default()).verdict, Verdict::NotAWalker);
+        assert_eq!(
+            audited(WALKER, "0|1", Physics::default()).verdict,
+            Verdict::NotAWalker
+        );
     }
 
     #[test]
     fn a_stopped_audit_has_no_verdict() {
         let body: Body = WALKER.parse().unwrap();
         let trial = trial(body.height(), body.width(), Physics::default());
-        let subject = Subject { id: "x".to_string(), task: "same way".to_string(), body, known: None };
+        let subject = Subject {
+            id: "x".to_string(),
+            task: "same way".to_string(),
+            body,
+            known: None,
+        };
         assert!(
-            trial.robot(&subject, &Session::new(&AtomicBool::new(true), &()), &AtomicU64::new(0)).is_none()
+            trial
+                .robot(
+                    &subject,
+                    &Session::new(&AtomicBool::new(true), &()),
+                    &AtomicU64::new(0)
+                )
+                .is_none()
         );
     }
 
@@ -391,22 +556,42 @@ mod tests {
         let image = |sensed: f64, other: f64| {
             Grid::from_fn(4, 6, |r, c| if (r, c) == (0, 5) { sensed } else { other })
         };
-        let stimuli =
-            vec![image(0.0, 0.0), image(1.0, 0.0), image(0.0, 1.0), image(1.0, 1.0), image(0.0, 0.5)];
+        let stimuli = vec![
+            image(0.0, 0.0),
+            image(1.0, 0.0),
+            image(0.0, 1.0),
+            image(1.0, 1.0),
+            image(0.0, 0.5),
+        ];
         let Trial { config, .. } = trial(4, 6, Physics::default());
-        let setting = PerturbedSetting { body, physics: config.physics, protocol: config.protocol, stimuli };
-        let displacements = displacements_in(&setting, &Session::default()).unwrap().unwrap();
+        let setting = PerturbedSetting {
+            body,
+            physics: config.physics,
+            protocol: config.protocol,
+            stimuli,
+        };
+        let displacements = displacements_in(&setting, &Session::default())
+            .unwrap()
+            .unwrap();
         let system = Arc::new(System::new(&setting.body, setting.physics.clone()));
         let (all, _) = walk(&system, &setting.protocol, &setting.stimuli, true, &NEVER).unwrap();
         assert_eq!(displacements, all);
         assert_ne!(all[0], all[1], "it sees something");
         let sequential = PerturbedSetting {
-            protocol: Protocol { rollout: RolloutMode::Sequential, ..setting.protocol.clone() },
+            protocol: Protocol {
+                rollout: RolloutMode::Sequential,
+                ..setting.protocol.clone()
+            },
             ..setting
         };
-        let displacements = displacements_in(&sequential, &Session::default()).unwrap().unwrap();
+        let displacements = displacements_in(&sequential, &Session::default())
+            .unwrap()
+            .unwrap();
         assert_eq!(displacements.len(), 5);
-        assert_ne!(displacements[0], displacements[2], "what comes later begins elsewhere");
+        assert_ne!(
+            displacements[0], displacements[2],
+            "what comes later begins elsewhere"
+        );
     }
 
     #[test]
@@ -414,12 +599,22 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(AUDIT_JSON);
         let file = |sha: &str, ids: &[&str]| {
-            let robot =
-                |id: &&str| RobotAudit { id: id.to_string(), ..audited("1", "0|1", Physics::default()) };
+            let robot = |id: &&str| RobotAudit {
+                id: id.to_string(),
+                ..audited("1", "0|1", Physics::default())
+            };
             let robots = ids.iter().map(robot).collect();
-            AuditFile { robots, ..AuditFile::new("run", sha.to_string(), 3, &Criteria::default()) }
+            AuditFile {
+                robots,
+                ..AuditFile::new("run", sha.to_string(), 3, &Criteria::default())
+            }
         };
-        let ids = |file: &AuditFile| file.robots.iter().map(|robot| robot.id.clone()).collect::<Vec<_>>();
+        let ids = |file: &AuditFile| {
+            file.robots
+                .iter()
+                .map(|robot| robot.id.clone())
+                .collect::<Vec<_>>()
+        };
         let mut ours = file("a", &["x", "y"]);
         ours.add_known(&path);
         assert_eq!(ids(&ours), ["x", "y"]);

@@ -40,7 +40,9 @@ type Pattern = dyn Fn(usize, usize) -> Material;
 /// Returns bodies of every kind that differs in cost. Their voxels form a fixed pattern, so that
 /// figures compare across machines and versions.
 pub fn specimens() -> Vec<Specimen> {
-    use Material::{Empty, MuscleAntiphase, MuscleInPhase, Rigid, SensorExpand, SensorShrink, Soft};
+    use Material::{
+        Empty, MuscleAntiphase, MuscleInPhase, Rigid, SensorExpand, SensorShrink, Soft,
+    };
     let active = |r: usize, c: usize| match (r / 2 + c / 3) % 4 {
         0 => MuscleInPhase,
         1 => SensorExpand,
@@ -48,24 +50,54 @@ pub fn specimens() -> Vec<Specimen> {
         _ => SensorShrink,
     };
     let soft = move |r: usize, c: usize| {
-        if (r / 3 + c / 3).is_multiple_of(2) { Soft } else { active(r, c) }
+        if (r / 3 + c / 3).is_multiple_of(2) {
+            Soft
+        } else {
+            active(r, c)
+        }
     };
     let kinds: [(&'static str, Box<Pattern>); 5] = [
         ("full, soft and active", Box::new(soft)),
         (
             "half, soft and active",
-            Box::new(move |r, c| if c < 7 || (r < 1 && c < 14) { soft(r, c) } else { Empty }),
+            Box::new(move |r, c| {
+                if c < 7 || (r < 1 && c < 14) {
+                    soft(r, c)
+                } else {
+                    Empty
+                }
+            }),
         ),
-        ("small, soft and active", Box::new(move |r, c| if r >= 9 && c < 8 { soft(r, c) } else { Empty })),
-        ("full, mostly rigid", Box::new(move |r, c| if (r + 2 * c) % 3 < 2 { Rigid } else { soft(r, c) })),
+        (
+            "small, soft and active",
+            Box::new(move |r, c| if r >= 9 && c < 8 { soft(r, c) } else { Empty }),
+        ),
+        (
+            "full, mostly rigid",
+            Box::new(move |r, c| {
+                if (r + 2 * c) % 3 < 2 {
+                    Rigid
+                } else {
+                    soft(r, c)
+                }
+            }),
+        ),
         // Gaps in diagonal pairs: at each, the other two voxels touch at a corner only.
         (
             "corner contacts",
-            Box::new(move |r, c| if matches!((r % 4, c % 4), (1, 2) | (2, 1)) { Empty } else { soft(r, c) }),
+            Box::new(move |r, c| {
+                if matches!((r % 4, c % 4), (1, 2) | (2, 1)) {
+                    Empty
+                } else {
+                    soft(r, c)
+                }
+            }),
         ),
     ];
     let specimen = |(name, material): (&'static str, Box<Pattern>)| {
-        Body::new(Grid::from_fn(14, 14, material)).ok().map(|body| Specimen { name, body })
+        Body::new(Grid::from_fn(14, 14, material))
+            .ok()
+            .map(|body| Specimen { name, body })
     };
     kinds.into_iter().filter_map(specimen).collect()
 }
@@ -79,11 +111,18 @@ const WARM_UP: u32 = 50;
 /// `repetitions` times, for about two seconds at most, and takes the median.
 pub(crate) fn measure(specimen: &Specimen, set: InstructionSet, repetitions: usize) -> Speed {
     let physics = Physics::default();
-    let start = Start { column: 493, row: physics.ground_row };
+    let start = Start {
+        column: 493,
+        row: physics.ground_row,
+    };
     let system = System::new(&specimen.body, physics.clone());
     let mut world = World::new(system, start).with_instructions(set);
     let stimulus = |r: usize, c: usize| if (r + c).is_multiple_of(3) { 1.0 } else { 0.0 };
-    world.set_stimulus(&Grid::from_fn(specimen.body.height(), specimen.body.width(), stimulus));
+    world.set_stimulus(&Grid::from_fn(
+        specimen.body.height(),
+        specimen.body.width(),
+        stimulus,
+    ));
     let mut live = |steps: u32| {
         let begin = thread_time();
         for _ in 0..steps {
@@ -119,8 +158,12 @@ const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Measures all specimens on some instruction sets, one after the other.
 pub(crate) fn table(sets: &[InstructionSet]) -> Vec<Speed> {
-    let measured =
-        |set: &InstructionSet| specimens().iter().map(|s| measure(s, *set, REPETITIONS)).collect::<Vec<_>>();
+    let measured = |set: &InstructionSet| {
+        specimens()
+            .iter()
+            .map(|s| measure(s, *set, REPETITIONS))
+            .collect::<Vec<_>>()
+    };
     sets.iter().flat_map(measured).collect()
 }
 
@@ -131,10 +174,19 @@ mod tests {
     #[test]
     fn specimens_are_the_bodies_that_figures_are_quoted_for() {
         let list = specimens();
-        let voxels: Vec<usize> = list.iter().map(|specimen| specimen.body.counts().total).collect();
+        let voxels: Vec<usize> = list
+            .iter()
+            .map(|specimen| specimen.body.counts().total)
+            .collect();
         assert_eq!(voxels, [196, 105, 40, 196, 172]);
         assert!(list.iter().all(|specimen| specimen.body.is_valid(3)));
-        let rigid = list[3].body.voxels().cells().iter().filter(|m| **m == Material::Rigid).count();
+        let rigid = list[3]
+            .body
+            .voxels()
+            .cells()
+            .iter()
+            .filter(|m| **m == Material::Rigid)
+            .count();
         assert_eq!(rigid, 131);
         let points = |i: usize| System::new(&list[i].body, Physics::default()).point_count();
         // 24 gaps, none of which removes a whole vertex; each of 12 corner contacts adds a point.

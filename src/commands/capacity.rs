@@ -65,7 +65,10 @@ pub fn capacity(options: &CapacityOptions, session: &Session) -> Result<Capacity
     let config = &options.config;
     kernel_fits(config, setting)?;
     check_out(&options.out, &options.eval, CAPACITY_JSON)?;
-    if FIGURES.iter().any(|ending| options.out.with_extension(ending) == options.out) {
+    if FIGURES
+        .iter()
+        .any(|ending| options.out.with_extension(ending) == options.out)
+    {
         let text = "expected another ending: the figure beside the results has that name";
         return Err(Error::argument("out", options.out.display(), text));
     }
@@ -74,10 +77,17 @@ pub fn capacity(options: &CapacityOptions, session: &Session) -> Result<Capacity
     let images = Images::of(&report, setting, (&options.eval, config), session)?;
     let grouping = setting.task.grouping()?;
     let of_split = |split: &grouping::ClassSplit| -> Vec<&RobotReport> {
-        robots.iter().copied().filter(|robot| split.is_called(&robot.task)).collect()
+        robots
+            .iter()
+            .copied()
+            .filter(|robot| split.is_called(&robot.task))
+            .collect()
     };
-    let splits: Vec<&grouping::ClassSplit> =
-        grouping.tasks().iter().filter(|split| !of_split(split).is_empty()).collect();
+    let splits: Vec<&grouping::ClassSplit> = grouping
+        .tasks()
+        .iter()
+        .filter(|split| !of_split(split).is_empty())
+        .collect();
     let known = Trainings::read(&options.out)?;
     let mut networks = Networks {
         config,
@@ -106,7 +116,8 @@ pub fn capacity(options: &CapacityOptions, session: &Session) -> Result<Capacity
     let mut unwritten = Unwritten::default();
     for split in splits {
         let of_task = of_split(split);
-        let accuracy = of_task.iter().map(|robot| robot.accuracy).sum::<f64>() / of_task.len() as f64;
+        let accuracy =
+            of_task.iter().map(|robot| robot.accuracy).sum::<f64>() / of_task.len() as f64;
         let Some(curves) = networks.curves(split, accuracy)? else {
             file.stopped = true;
             break;
@@ -123,7 +134,10 @@ pub fn capacity(options: &CapacityOptions, session: &Session) -> Result<Capacity
     if file.stopped && !file.tasks.is_empty() {
         unwritten.tried(write(options, &file), session)?;
     }
-    Ok(CapacityOutcome { file, unwritten: unwritten.error().or(networks.unkept.error()) })
+    Ok(CapacityOutcome {
+        file,
+        unwritten: unwritten.error().or(networks.unkept.error()),
+    })
 }
 
 /// Returns the setting of an evaluation, or an error if no networks can be compared with it.
@@ -135,13 +149,19 @@ fn comparable<'a>(
     let name = options.eval.display();
     let Some(setting) = &report.setting else {
         let text = format!("{name}: expected \"setting\": an earlier version wrote it");
-        return Err(Error::input(text).remedy(Remedy::Run(Invocation::new("eval"), "makes a new one")));
+        return Err(
+            Error::input(text).remedy(Remedy::Run(Invocation::new("eval"), "makes a new one"))
+        );
     };
     if report.split != HeldOut::Test {
-        let text =
-            format!("{name}: expected an evaluation on test images, found one on {} images", report.split);
-        return Err(Error::input(text)
-            .remedy(Remedy::Run(Invocation::new("eval").option("split", "test"), "makes such a one")));
+        let text = format!(
+            "{name}: expected an evaluation on test images, found one on {} images",
+            report.split
+        );
+        return Err(Error::input(text).remedy(Remedy::Run(
+            Invocation::new("eval").option("split", "test"),
+            "makes such a one",
+        )));
     }
     if let Some(own) = &report.trained_on {
         let text = format!(
@@ -149,23 +169,31 @@ fn comparable<'a>(
              on {}",
             own.name, report.dataset
         );
-        return Err(Error::input(text)
-            .remedy(Remedy::Run(Invocation::new("eval"), "shows those, if it names no dataset")));
+        return Err(Error::input(text).remedy(Remedy::Run(
+            Invocation::new("eval"),
+            "shows those, if it names no dataset",
+        )));
     }
     if report.runs.is_empty() {
-        let text = format!("{name}: runs: expected one or more, whose training images networks learn from");
-        return Err(Error::input(text).remedy(Remedy::Run(Invocation::new("eval"), "makes a new one")));
+        let text = format!(
+            "{name}: runs: expected one or more, whose training images networks learn from"
+        );
+        return Err(
+            Error::input(text).remedy(Remedy::Run(Invocation::new("eval"), "makes a new one"))
+        );
     }
     if let [of] = report.runs.as_slice()
         && let Ok(run) = RunFile::read(&options.eval.with_file_name(RUN_JSON))
         && run.fingerprint() != of.sha256
     {
-        session
-            .observer
-            .warning(&format!("{name}: stale: the run beside it is another one, or has gone on since"));
+        session.observer.warning(&format!(
+            "{name}: stale: the run beside it is another one, or has gone on since"
+        ));
     }
     if report.stopped {
-        session.observer.warning(&format!("{name}: the evaluation was stopped before its last robot"));
+        session.observer.warning(&format!(
+            "{name}: the evaluation was stopped before its last robot"
+        ));
     }
     Ok(setting)
 }
@@ -174,21 +202,43 @@ fn comparable<'a>(
 fn kernel_fits(config: &CapacityConfig, setting: &RunSetting) -> Result<(), Error> {
     let side = setting.body.height.min(setting.body.width);
     let (kernel, pooling) = (config.cnn.kernel, config.cnn.pooling);
-    let most = if pooling == Pooling::Max2 { side.saturating_sub(1) } else { side };
+    let most = if pooling == Pooling::Max2 {
+        side.saturating_sub(1)
+    } else {
+        side
+    };
     if kernel > most && config.networks.contains(&NetworkKind::Cnn) {
         let of = format!("with images of {side} pixels and pooling {pooling:?}").to_lowercase();
-        return Err(Error::input(format!("capacity: cnn.kernel = {kernel}: expected up to {most}, {of}")));
+        return Err(Error::input(format!(
+            "capacity: cnn.kernel = {kernel}: expected up to {most}, {of}"
+        )));
     }
     Ok(())
 }
 
 /// Hashes all that the trainings of a kind of network depend on; `images` names their images.
-fn key(split: &grouping::ClassSplit, kind: NetworkKind, config: &CapacityConfig, images: &str) -> String {
+fn key(
+    split: &grouping::ClassSplit,
+    kind: NetworkKind,
+    config: &CapacityConfig,
+    images: &str,
+) -> String {
     let groups = [Group::A, Group::B].map(|group| split.classes(group));
     // Other arithmetic gives other trainings, so those of networks in f32 must not match.
     let by = concat!(env!("CARGO_PKG_VERSION"), " in f64");
-    let all = (by, groups, kind.name(), config.of(kind), images, config.seed);
-    sha256_hex(serde_json::to_string(&all).expect("JSON has all of it").as_bytes())
+    let all = (
+        by,
+        groups,
+        kind.name(),
+        config.of(kind),
+        images,
+        config.seed,
+    );
+    sha256_hex(
+        serde_json::to_string(&all)
+            .expect("JSON has all of it")
+            .as_bytes(),
+    )
 }
 
 /// The networks to compare with robots.
@@ -215,20 +265,41 @@ impl Networks<'_> {
         let Networks { config, known, .. } = self;
         let of_one = |(split, kind): (&grouping::ClassSplit, NetworkKind)| -> usize {
             let key = self.key(split, kind);
-            config.sizes().map(|size| known.of(&key, size).len().min(config.trainings)).sum()
+            config
+                .sizes()
+                .map(|size| known.of(&key, size).len().min(config.trainings))
+                .sum()
         };
         let kinds = |split| config.networks.iter().map(move |kind| (split, *kind));
-        let before = splits.iter().copied().flat_map(kinds).map(of_one).sum::<usize>() as u64;
+        let before = splits
+            .iter()
+            .copied()
+            .flat_map(kinds)
+            .map(of_one)
+            .sum::<usize>() as u64;
         let per_task = config.networks.len() * config.sizes().count() * config.trainings;
         let total = (splits.len() * per_task) as u64;
-        let kept = if before > 0 { format!(" ({before} known from before)") } else { String::new() };
+        let kept = if before > 0 {
+            format!(" ({before} known from before)")
+        } else {
+            String::new()
+        };
         let label = format!("training {}{kept}:", counted(total, "network", "networks"));
-        self.session.observer.begins(&Work { label, total, known: before, unit: "trainings" });
+        self.session.observer.begins(&Work {
+            label,
+            total,
+            known: before,
+            unit: "trainings",
+        });
         self.done.store(before, Ordering::Relaxed);
     }
 
     /// Returns the curves of a task whose robots have this accuracy, or `None` if stopped.
-    fn curves(&mut self, split: &grouping::ClassSplit, accuracy: f64) -> Result<Option<Vec<Curve>>, Error> {
+    fn curves(
+        &mut self,
+        split: &grouping::ClassSplit,
+        accuracy: f64,
+    ) -> Result<Option<Vec<Curve>>, Error> {
         let config = self.config;
         let mut curves = Vec::new();
         for &kind in &config.networks {
@@ -249,14 +320,23 @@ impl Networks<'_> {
     /// Trains the networks of a size that are not known yet, and stores them. Returns false if
     /// stopped.
     fn train(&mut self, samples: &Task, key: &str, size: usize) -> Result<bool, Error> {
-        let Networks { config, session, done, pool, .. } = &*self;
+        let Networks {
+            config,
+            session,
+            done,
+            pool,
+            ..
+        } = &*self;
         let open = self.known.of(key, size).len()..config.trainings;
         let train = |number: usize| {
             let trained = samples.train(size, config, number, session)?;
-            session.observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1);
+            session
+                .observer
+                .progress(done.fetch_add(1, Ordering::Relaxed) + 1);
             Ok(trained)
         };
-        let trained: Vec<Result<Trained, Error>> = pool.install(|| open.into_par_iter().map(train).collect());
+        let trained: Vec<Result<Trained, Error>> =
+            pool.install(|| open.into_par_iter().map(train).collect());
         // Trainings are kept in order: those before the first that was stopped.
         let (mut finished, mut goes_on) = (Vec::new(), true);
         for trained in trained {
@@ -281,19 +361,35 @@ fn point(size: usize, trained: &[(f64, usize)]) -> Point {
     let accuracies: Vec<f64> = trained.iter().map(|(accuracy, _)| *accuracy).collect();
     let mean = accuracies.iter().sum::<f64>() / accuracies.len().max(1) as f64;
     let parameters = trained.first().map_or(0, |(_, parameters)| *parameters);
-    Point { size, mean, standard_deviation: standard_deviation(&accuracies), parameters }
+    Point {
+        size,
+        mean,
+        standard_deviation: standard_deviation(&accuracies),
+        parameters,
+    }
 }
 
 fn curve_of(kind: NetworkKind, points: Vec<Point>, accuracy: f64) -> Curve {
-    let means: Vec<(f64, f64)> = points.iter().map(|point| (point.size as f64, point.mean)).collect();
+    let means: Vec<(f64, f64)> = points
+        .iter()
+        .map(|point| (point.size as f64, point.mean))
+        .collect();
     let fit = curve::parabola(&means);
-    let within = means.first().zip(means.last()).map(|(first, last)| (first.0, last.0));
+    let within = means
+        .first()
+        .zip(means.last())
+        .map(|(first, last)| (first.0, last.0));
     let capacity = match fit.zip(within) {
         Some((fit, within)) => curve::first_crossing(fit, accuracy, within),
         // Fewer than three sizes have no parabola.
         None => curve::first_of(&means, accuracy),
     };
-    Curve { network: kind.name().to_string(), points, fit, capacity }
+    Curve {
+        network: kind.name().to_string(),
+        points,
+        fit,
+        capacity,
+    }
 }
 
 fn write(options: &CapacityOptions, file: &CapacityFile) -> Result<(), Error> {
@@ -302,7 +398,10 @@ fn write(options: &CapacityOptions, file: &CapacityFile) -> Result<(), Error> {
 }
 
 /// Returns the robots that count, all or the physical ones.
-fn robots<'a>(report: &'a EvalFile, options: &CapacityOptions) -> Result<Vec<&'a RobotReport>, Error> {
+fn robots<'a>(
+    report: &'a EvalFile,
+    options: &CapacityOptions,
+) -> Result<Vec<&'a RobotReport>, Error> {
     let name = options.eval.display();
     if report.robots.is_empty() {
         return Err(Error::input(format!("{name}: there is no robot in it")));
@@ -319,7 +418,10 @@ fn robots<'a>(report: &'a EvalFile, options: &CapacityOptions) -> Result<Vec<&'a
     let audits = audits?;
     let mut physical: Vec<&RobotReport> = Vec::new();
     for robot in &report.robots {
-        match audits.get(robot.run).and_then(|audit| audit.robot(&robot.id)) {
+        match audits
+            .get(robot.run)
+            .and_then(|audit| audit.robot(&robot.id))
+        {
             Some(found) if found.is_physical() => physical.push(robot),
             Some(_) => {}
             None => {
@@ -351,7 +453,10 @@ mod tests {
             let grouping = Grouping::two_groups(groups[0], groups[1]).unwrap();
             key(&grouping.tasks()[0], kind, config, images)
         };
-        let other_seed = CapacityConfig { seed: config.seed + 1, ..config.clone() };
+        let other_seed = CapacityConfig {
+            seed: config.seed + 1,
+            ..config.clone()
+        };
         let keys = [
             of([&[1], &[26]], NetworkKind::Mlp, &config, "a"),
             // A class of two digits is not two classes of one digit.

@@ -51,7 +51,12 @@ pub(crate) fn info(
         .iter()
         .filter_map(|(&split, found)| Some((split, known_as(&found.fingerprint, &found.files)?)));
     let others = known.filter(|(_, known)| *known != name).collect();
-    Ok(FoundDataset { info, published, others, problems })
+    Ok(FoundDataset {
+        info,
+        published,
+        others,
+        problems,
+    })
 }
 
 #[cfg(test)]
@@ -64,21 +69,45 @@ mod tests {
     fn info_shows_the_split_that_is_there_and_why_the_other_is_not() {
         let folder = tempfile::tempdir().unwrap();
         let given = places(Some(folder.path()), None, None);
-        assert!(info("mnist", &given, None).unwrap_err().to_string().contains("train images"));
-        let write = |name: &str, bytes: Vec<u8>| std::fs::write(folder.path().join(name), bytes).unwrap();
-        write("t10k-images-idx3-ubyte", [idx::header(&[2, 1, 1]), vec![0, 255]].concat());
-        write("t10k-labels-idx1-ubyte", [idx::header(&[2]), vec![3, 3]].concat());
+        assert!(
+            info("mnist", &given, None)
+                .unwrap_err()
+                .to_string()
+                .contains("train images")
+        );
+        let write =
+            |name: &str, bytes: Vec<u8>| std::fs::write(folder.path().join(name), bytes).unwrap();
+        write(
+            "t10k-images-idx3-ubyte",
+            [idx::header(&[2, 1, 1]), vec![0, 255]].concat(),
+        );
+        write(
+            "t10k-labels-idx1-ubyte",
+            [idx::header(&[2]), vec![3, 3]].concat(),
+        );
         let found = info("mnist", &given, None).unwrap();
         assert_eq!(found.info.splits[&Split::Test].per_class[&3], 2);
         assert!(matches!(found.problems.as_slice(), [(Split::Train, _)]));
         assert!(found.published.is_empty());
         let builtin = info("builtin", &[], None).unwrap().info;
-        assert_eq!((builtin.splits.len(), builtin.differences()), (2, Vec::new()));
-        write("train-images-idx3-ubyte", [idx::header(&[2, 2, 1]), vec![0, 255, 0, 9]].concat());
-        write("train-labels-idx1-ubyte", [idx::header(&[2]), vec![3, 4]].concat());
+        assert_eq!(
+            (builtin.splits.len(), builtin.differences()),
+            (2, Vec::new())
+        );
+        write(
+            "train-images-idx3-ubyte",
+            [idx::header(&[2, 2, 1]), vec![0, 255, 0, 9]].concat(),
+        );
+        write(
+            "train-labels-idx1-ubyte",
+            [idx::header(&[2]), vec![3, 4]].concat(),
+        );
         assert_eq!(
             info("mnist", &given, None).unwrap().info.differences(),
-            ["train images have 2 × 1 pixels, test images 1 × 1", "there are no test images of class 4"]
+            [
+                "train images have 2 × 1 pixels, test images 1 × 1",
+                "there are no test images of class 4"
+            ]
         );
     }
 }

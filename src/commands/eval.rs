@@ -12,7 +12,9 @@ use crate::commands::eval::images::{Draw, HeldOutImages};
 use crate::config::validation::LEAST;
 use crate::config::{Config, TaskConfig};
 use crate::data::dataset::{Dataset, Split};
-use crate::images::whereabouts::{Whereabouts, load_dataset_of, part_of_others, say_transposed, size_of};
+use crate::images::whereabouts::{
+    Whereabouts, load_dataset_of, part_of_others, say_transposed, size_of,
+};
 use crate::robots;
 use crate::robots::selection::{Chosen, Selection};
 use crate::search::held_out_run::Trial;
@@ -61,7 +63,12 @@ pub struct EvalOptions {
 impl EvalOptions {
     fn draw(&self) -> Draw {
         let choosing = self.robots.validated().map(|_| self.validation);
-        Draw { images: self.images, split: self.split, seed: self.seed, choosing }
+        Draw {
+            images: self.images,
+            split: self.split,
+            seed: self.seed,
+            choosing,
+        }
     }
 }
 
@@ -81,13 +88,27 @@ pub struct EvalOutcome {
 /// Returns an error if the archive, data or selection is wrong.
 pub fn eval(options: &EvalOptions, session: &Session) -> Result<EvalOutcome, Error> {
     let opened = Opened::new(options, session)?;
-    let Opened { sources, config, grouping, wanted, dataset, steps, .. } = &opened;
+    let Opened {
+        sources,
+        config,
+        grouping,
+        wanted,
+        dataset,
+        steps,
+        ..
+    } = &opened;
     if let Some(name) = opened.other {
         say_transposed(dataset, &config.data.of(name), session);
     }
     let size = size_of(&sources[0].run.dataset, &config.data.dataset, dataset);
-    let part = |source: &StoredRun| part_of_others(&source.run.config, size, dataset, options.split.split());
-    sources.iter().find_map(part).iter().for_each(|text| session.observer.warning(text));
+    let part = |source: &StoredRun| {
+        part_of_others(&source.run.config, size, dataset, options.split.split())
+    };
+    sources
+        .iter()
+        .find_map(part)
+        .iter()
+        .for_each(|text| session.observer.warning(text));
     let robots = skilled(options.robots.of(sources, options.seed)?, grouping, session)?;
     let shown = HeldOutImages::draw(config, sources, dataset, options.draw())?;
     let mut report = opened.report(options, &shown);
@@ -100,14 +121,27 @@ pub fn eval(options: &EvalOptions, session: &Session) -> Result<EvalOutcome, Err
         None => (robots, Vec::new()),
         Some(wanted) => {
             // Indices identify validation images, and only in the run's own data.
-            let others = opened.other.map(|_| opened.own(&[Split::Train])).transpose()?;
+            let others = opened
+                .other
+                .map(|_| opened.own(&[Split::Train]))
+                .transpose()?;
             let of_runs = others.as_ref().unwrap_or(dataset);
-            let best =
-                validation::chosen(sources, &robots, &options.robots, of_runs, grouping, wanted, &walker)?;
+            let best = validation::chosen(
+                sources,
+                &robots,
+                &options.robots,
+                of_runs,
+                grouping,
+                wanted,
+                &walker,
+            )?;
             let all_know = session.ranks.all(best.is_some());
             let Some(best) = best.filter(|_| all_know) else {
                 report.stopped = true;
-                return Ok(EvalOutcome { file: report, unwritten: None });
+                return Ok(EvalOutcome {
+                    file: report,
+                    unwritten: None,
+                });
             };
             best.into_iter().unzip()
         }
@@ -119,10 +153,21 @@ pub fn eval(options: &EvalOptions, session: &Session) -> Result<EvalOutcome, Err
         counted(images, "image", "images")
     );
     let own_share = count.div_ceil(session.ranks.size());
-    session.observer.begins(&Work::new(label, (own_share * images) as u64, "rollouts"));
-    let testing = Testing { session, options, sources, grouping, shown: &shown };
+    session
+        .observer
+        .begins(&Work::new(label, (own_share * images) as u64, "rollouts"));
+    let testing = Testing {
+        session,
+        options,
+        sources,
+        grouping,
+        shown: &shown,
+    };
     let unwritten = testing.test(&robots, scores, &walker()?, &mut report)?;
-    Ok(EvalOutcome { file: report, unwritten: unwritten.error() })
+    Ok(EvalOutcome {
+        file: report,
+        unwritten: unwritten.error(),
+    })
 }
 
 /// Returns the results in the file if they are of this very test: same program version, runs,
@@ -132,7 +177,12 @@ pub(crate) fn known(options: &EvalOptions, session: &Session) -> Result<Option<E
         return Ok(None);
     };
     let opened = Opened::new(options, session)?;
-    let shown = HeldOutImages::draw(&opened.config, &opened.sources, &opened.dataset, options.draw())?;
+    let shown = HeldOutImages::draw(
+        &opened.config,
+        &opened.sources,
+        &opened.dataset,
+        options.draw(),
+    )?;
     let is_it = !known.stopped
         && known.head() == opened.report(options, &shown)
         && is_of_robots(&known, &opened.sources, options)?;
@@ -164,7 +214,10 @@ pub(crate) fn differing(
         HowMany::All => known.images.len(),
         HowMany::Evenly(count) => count,
     };
-    let own = known.trained_on.as_ref().map_or(&known.dataset, |own| &own.name);
+    let own = known
+        .trained_on
+        .as_ref()
+        .map_or(&known.dataset, |own| &own.name);
     let asked = [
         options.robots.describe(),
         options.dataset.as_ref().unwrap_or(own).clone(),
@@ -194,7 +247,9 @@ pub(crate) fn is_of_robots(
         let wanted = |config: &Config| options.validation.unwrap_or(config.validation.images);
         for (number, source) in sources.iter().enumerate() {
             let images = wanted(&source.run.config);
-            if of_run(number).any(|robot| robot.validation.as_ref().is_none_or(|v| v.images != images)) {
+            if of_run(number)
+                .any(|robot| robot.validation.as_ref().is_none_or(|v| v.images != images))
+            {
                 return Ok(false);
             }
             if !matches!(options.robots, Selection::Physical(_)) {
@@ -202,7 +257,10 @@ pub(crate) fn is_of_robots(
             }
             let audit = AuditFile::if_any(&source.run, &source.path)?;
             let is_physical = |robot: &RobotReport| {
-                audit.as_ref().and_then(|audit| audit.robot(&robot.id)).is_some_and(RobotAudit::is_physical)
+                audit
+                    .as_ref()
+                    .and_then(|audit| audit.robot(&robot.id))
+                    .is_some_and(RobotAudit::is_physical)
             };
             if !of_run(number).all(is_physical) {
                 return Ok(false);
@@ -212,7 +270,9 @@ pub(crate) fn is_of_robots(
     }
     let (_, grouping) = together(sources)?;
     let chosen = options.robots.of(sources, options.seed)?;
-    let chosen = chosen.iter().filter(|chosen| task_of(&grouping, chosen.robot).is_some());
+    let chosen = chosen
+        .iter()
+        .filter(|chosen| task_of(&grouping, chosen.robot).is_some());
     let chosen = chosen.map(|chosen| (chosen.source, &chosen.robot.id));
     Ok(chosen.eq(known.robots.iter().map(|robot| (robot.run, &robot.id))))
 }
@@ -223,7 +283,10 @@ fn together(sources: &[StoredRun]) -> Result<(Config, Grouping), Error> {
     let configs = || sources.iter().map(|source| &source.run.config);
     let config = Config::together(configs()).expect("there is a run");
     let task = TaskConfig::together(configs().map(|config| &config.task));
-    let config = Config { task: task.expect("the tasks of all runs were compared"), ..config };
+    let config = Config {
+        task: task.expect("the tasks of all runs were compared"),
+        ..config
+    };
     let grouping = config.grouping()?;
     Ok((config, grouping))
 }
@@ -249,14 +312,22 @@ impl<'o> Opened<'o> {
     fn new(options: &'o EvalOptions, session: &Session) -> Result<Self, Error> {
         let threshold = options.threshold;
         if !(0.0..=MOST).contains(&threshold) {
-            return Err(Error::argument("threshold", threshold, "expected 0 or more voxel lengths"));
+            return Err(Error::argument(
+                "threshold",
+                threshold,
+                "expected 0 or more voxel lengths",
+            ));
         }
         let sources = sources(options)?;
         let (config, grouping) = together(&sources)?;
         let wanted = wanted(options, &config)?;
-        let other = options.dataset.as_deref().filter(|name| *name != config.data.dataset);
+        let other = options
+            .dataset
+            .as_deref()
+            .filter(|name| *name != config.data.dataset);
         if other.is_some() && options.split == HeldOut::Validation {
-            let text = "expected with test images only: validation images are of the runs' own data";
+            let text =
+                "expected with test images only: validation images are of the runs' own data";
             return Err(Error::usage(text.to_string()).about("dataset"));
         }
         let mut whereabouts = Whereabouts::given(session.folder());
@@ -270,7 +341,16 @@ impl<'o> Opened<'o> {
             Some(name) => whereabouts.load(&config.data.of(name), &Split::ALL)?,
         };
         let steps = checked_steps(&config, options.cycles)?;
-        Ok(Opened { sources, config, grouping, wanted, whereabouts, other, dataset, steps })
+        Ok(Opened {
+            sources,
+            config,
+            grouping,
+            wanted,
+            whereabouts,
+            other,
+            dataset,
+            steps,
+        })
     }
 
     fn own(&self, splits: &[Split]) -> Result<Dataset, Error> {
@@ -279,10 +359,23 @@ impl<'o> Opened<'o> {
 
     /// Returns the report as it is before the first robot.
     fn report(&self, options: &EvalOptions, shown: &HeldOutImages) -> EvalFile {
-        let Opened { sources, config, other, dataset, steps, .. } = self;
-        let asked = (options.robots.describe(), options.split, options.seed, options.threshold);
+        let Opened {
+            sources,
+            config,
+            other,
+            dataset,
+            steps,
+            ..
+        } = self;
+        let asked = (
+            options.robots.describe(),
+            options.split,
+            options.seed,
+            options.threshold,
+        );
         let test_sha256 = dataset.fingerprint(Split::Test);
-        let mut report = EvalFile::new((sources, config), asked, *steps, &shown.images, test_sha256);
+        let mut report =
+            EvalFile::new((sources, config), asked, *steps, &shown.images, test_sha256);
         if let Some(name) = other {
             report.transfer(name, dataset);
         }
@@ -298,7 +391,11 @@ fn own(
     splits: &[Split],
 ) -> Result<Dataset, Error> {
     load_dataset_of(Some(&run.run.dataset), config, whereabouts, splits).map_err(|error| {
-        let named = if error.remedies.is_empty() { error.remedy(Remedy::NameData) } else { error };
+        let named = if error.remedies.is_empty() {
+            error.remedy(Remedy::NameData)
+        } else {
+            error
+        };
         named.remedy(Remedy::ShowOtherDataset)
     })
 }
@@ -322,7 +419,13 @@ impl Testing<'_> {
         walker: &HeldOutRun,
         report: &mut EvalFile,
     ) -> Result<Unwritten, Error> {
-        let Testing { session, options, sources, grouping, shown } = self;
+        let Testing {
+            session,
+            options,
+            sources,
+            grouping,
+            shown,
+        } = self;
         let (ranks, threshold) = (session.ranks, &options.threshold);
         let mut scores = scores.into_iter();
         let mut left = robots.len();
@@ -343,18 +446,32 @@ impl Testing<'_> {
                     is_stopped = true;
                     break;
                 };
-                let split = task_of(grouping, robot).expect("robots without a task are left out before");
+                let split =
+                    task_of(grouping, robot).expect("robots without a task are left out before");
                 left -= 1;
                 report.stopped = left > 0;
                 let run = &sources[*source].run;
-                let trial = Trial { run, robot, split, images: &shown.images, threshold: *threshold };
-                let (validation, of_trial) =
-                    (scores.next(), RobotReport::new(&trial, displacements, simulated));
-                report.robots.push(RobotReport { run: *source, validation, ..of_trial });
+                let trial = Trial {
+                    run,
+                    robot,
+                    split,
+                    images: &shown.images,
+                    threshold: *threshold,
+                };
+                let (validation, of_trial) = (
+                    scores.next(),
+                    RobotReport::new(&trial, displacements, simulated),
+                );
+                report.robots.push(RobotReport {
+                    run: *source,
+                    validation,
+                    ..of_trial
+                });
                 report.conclude();
             }
             if ranks.leads() && report.robots.len() > before {
-                let written = make_room(options, report, session).and_then(|()| write(options, report));
+                let written =
+                    make_room(options, report, session).and_then(|()| write(options, report));
                 unwritten.tried(written, session)?;
             }
             if is_stopped {
@@ -367,14 +484,21 @@ impl Testing<'_> {
 
 /// Reads the runs; checks that they can be tested together and the results written.
 fn sources(options: &EvalOptions) -> Result<Vec<StoredRun>, Error> {
-    let sources: Vec<StoredRun> =
-        options.archives.iter().map(|path| robots::open(path)).collect::<Result<_, _>>()?;
+    let sources: Vec<StoredRun> = options
+        .archives
+        .iter()
+        .map(|path| robots::open(path))
+        .collect::<Result<_, _>>()?;
     for source in &sources {
         source.has_task()?;
         check_out(&options.out, &source.path, own_name(options.split))?;
         same_setting(&sources[0], source)?;
     }
-    different(sources.iter().map(|source| (source.path.as_path(), &source.run)))?;
+    different(
+        sources
+            .iter()
+            .map(|source| (source.path.as_path(), &source.run)),
+    )?;
     replaced::<EvalFile>(&options.out)?;
     Ok(sources)
 }
@@ -392,10 +516,19 @@ fn wanted(options: &EvalOptions, config: &Config) -> Result<Option<validation::W
     };
     let images = options.validation.unwrap_or(config.validation.images);
     if images < LEAST {
-        return Err(Error::argument("validation", images, format!("expected {LEAST} or more images")));
+        return Err(Error::argument(
+            "validation",
+            images,
+            format!("expected {LEAST} or more images"),
+        ));
     }
     let argument = options.validation.map(|_| "validation");
-    Ok(Some(validation::Wanted { count, images, argument, threshold: options.threshold }))
+    Ok(Some(validation::Wanted {
+        count,
+        images,
+        argument,
+        threshold: options.threshold,
+    }))
 }
 
 /// Returns the robots that have a task, and warns about the others.
@@ -404,16 +537,20 @@ fn skilled<'a>(
     grouping: &Grouping,
     session: &Session,
 ) -> Result<Vec<Chosen<'a>>, Error> {
-    let (robots, unskilled): (Vec<Chosen>, Vec<Chosen>) =
-        robots.into_iter().partition(|chosen| task_of(grouping, chosen.robot).is_some());
+    let (robots, unskilled): (Vec<Chosen>, Vec<Chosen>) = robots
+        .into_iter()
+        .partition(|chosen| task_of(grouping, chosen.robot).is_some());
     if robots.is_empty() {
-        let text = "there is no robot to evaluate: those selected walk the same way for every class";
+        let text =
+            "there is no robot to evaluate: those selected walk the same way for every class";
         return Err(Error::input(text.to_string()));
     }
     if let Some(chosen) = unskilled.first() {
         let count = counted(unskilled.len(), "robot that walks", "robots that walk");
         let id = &chosen.robot.id;
-        session.observer.warning(&format!("left out: {count} the same way for every class ({id} …)"));
+        session.observer.warning(&format!(
+            "left out: {count} the same way for every class ({id} …)"
+        ));
     }
     Ok(robots)
 }
@@ -434,17 +571,31 @@ fn same_setting(first: &StoredRun, other: &StoredRun) -> Result<(), Error> {
     let differing = [
         ("task", TaskConfig::together([&a.task, &b.task]).is_none()),
         ("body", a.body != b.body),
-        ("stimulus", StimulusParams { margin: b.stimulus.margin, ..a.stimulus } != b.stimulus),
+        (
+            "stimulus",
+            StimulusParams {
+                margin: b.stimulus.margin,
+                ..a.stimulus
+            } != b.stimulus,
+        ),
         ("protocol", a.protocol != b.protocol),
         ("physics", a.physics != b.physics),
-        ("data", of_data(a) != of_data(b) || first.run.dataset != other.run.dataset),
+        (
+            "data",
+            of_data(a) != of_data(b) || first.run.dataset != other.run.dataset,
+        ),
     ];
     match differing.into_iter().find(|(_, differs)| *differs) {
         None => Ok(()),
         Some((section, _)) => {
             let (other, first) = (other.path.display(), first.path.display());
-            let but = if section == "stimulus" { ", but for margin," } else { "" };
-            let text = format!("{other}: expected the same [{section}]{but} in its config as {first}");
+            let but = if section == "stimulus" {
+                ", but for margin,"
+            } else {
+                ""
+            };
+            let text =
+                format!("{other}: expected the same [{section}]{but} in its config as {first}");
             Err(Error::input(text).advice("evaluate runs of different experiments one by one"))
         }
     }
@@ -453,8 +604,13 @@ fn same_setting(first: &StoredRun, other: &StoredRun) -> Result<(), Error> {
 /// Sets results of another test aside, if the file has any.
 fn make_room(options: &EvalOptions, report: &EvalFile, session: &Session) -> Result<(), Error> {
     let validated = |file: &EvalFile| file.robots.first()?.validation.as_ref().map(|of| of.images);
-    let is_same = |known: EvalFile| known.head() == report.head() && validated(&known) == validated(report);
-    results::make_room(&options.out, || EvalFile::read(&options.out).is_ok_and(is_same), session)
+    let is_same =
+        |known: EvalFile| known.head() == report.head() && validated(&known) == validated(report);
+    results::make_room(
+        &options.out,
+        || EvalFile::read(&options.out).is_ok_and(is_same),
+        session,
+    )
 }
 
 fn write(options: &EvalOptions, report: &EvalFile) -> Result<(), Error> {

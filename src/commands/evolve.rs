@@ -56,9 +56,13 @@ impl EvolveOutcome {
     /// Returns the id of the best robot on validation images or, without validation, the fittest.
     pub fn best(&self) -> Option<&str> {
         let better = |a: &Validated, b: &Validated| a.balanced_accuracy > b.balanced_accuracy;
-        let first =
-            self.validated.iter().reduce(|best, other| if better(other, best) { other } else { best });
-        first.map(|robot| robot.id.as_str()).or(self.run.best().map(|robot| robot.id.as_str()))
+        let first = self
+            .validated
+            .iter()
+            .reduce(|best, other| if better(other, best) { other } else { best });
+        first
+            .map(|robot| robot.id.as_str())
+            .or(self.run.best().map(|robot| robot.id.as_str()))
     }
 }
 
@@ -72,19 +76,30 @@ pub fn evolve(options: &EvolveOptions, session: &Session) -> Result<EvolveOutcom
     let resumes = options.if_exists == IfExists::Resume;
     // Check everything that can be known before anything is written.
     if resumes && options.out.join(TRAINING_JSON).exists() {
-        let text = format!("{}: the run in this folder is a training", options.out.display());
-        return Err(Error::occupied(text)
-            .remedy(Remedy::Run(Invocation::new("train").switch("resume", true), "goes on with it")));
+        let text = format!(
+            "{}: the run in this folder is a training",
+            options.out.display()
+        );
+        return Err(Error::occupied(text).remedy(Remedy::Run(
+            Invocation::new("train").switch("resume", true),
+            "goes on with it",
+        )));
     }
-    let whereabouts =
-        Whereabouts::given(session.folder()).and_of_resumed(options.if_exists, &options.out.join(RUN_JSON));
+    let whereabouts = Whereabouts::given(session.folder())
+        .and_of_resumed(options.if_exists, &options.out.join(RUN_JSON));
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;
     whereabouts::say_transposed(&dataset, &config.data, session);
-    let size = dataset.size(Split::Train).expect("its training images were loaded just now");
+    let size = dataset
+        .size(Split::Train)
+        .expect("its training images were loaded just now");
     let training = TrainingImages::of(config, &dataset)?;
     held_out::check(config, &[], "data.images_per_class", &dataset)?;
-    let mutations =
-        Mutations { seed: config.seed, spec: config.body_spec(), params: &config.genome, session };
+    let mutations = Mutations {
+        seed: config.seed,
+        spec: config.body_spec(),
+        params: &config.genome,
+        session,
+    };
     let first = mutations.random_immigrant(0, 0).map_err(unmade);
     // Only the leading rank has a folder.
     let ranks = session.ranks;
@@ -97,9 +112,9 @@ pub fn evolve(options: &EvolveOptions, session: &Session) -> Result<EvolveOutcom
     }
     let folder = opened?;
     let saved = match &folder {
-        Some(folder) if resumes => {
-            resume::saved(folder, config, &training, |text| session.observer.warning(&text))?
-        }
+        Some(folder) if resumes => resume::saved(folder, config, &training, |text| {
+            session.observer.warning(&text)
+        })?,
         _ => None,
     };
     let saved = ranks.broadcast(saved);
@@ -110,11 +125,15 @@ pub fn evolve(options: &EvolveOptions, session: &Session) -> Result<EvolveOutcom
     let pool = session.pool()?;
     let mut run = Run::new((config, &options.name), session, training, saved)?;
     let mut files = match folder {
-        Some(folder) => Some(Files { metrics: metrics(&folder, run.generation, session)?, folder }),
+        Some(folder) => Some(Files {
+            metrics: metrics(&folder, run.generation, session)?,
+            folder,
+        }),
         None => None,
     };
     session.observer.note(&run.beginning(&options.out));
-    pool.install(|| run.evolve(&mutations, &mut files, session)).map_err(goes_on)?;
+    pool.install(|| run.evolve(&mutations, &mut files, session))
+        .map_err(goes_on)?;
     let (file, totals) = (run.file(), run.totals());
     let is_whole = run.generation >= config.generations;
     let Some(mut files) = files else {
@@ -129,7 +148,8 @@ pub fn evolve(options: &EvolveOptions, session: &Session) -> Result<EvolveOutcom
     };
     let unwritten = files.save(&run).err().map(goes_on);
     // If the run was not written, robots would be chosen from an older run.json.
-    let chooses = is_whole && unwritten.is_none() && config.validation.best > 0 && !file.elites.is_empty();
+    let chooses =
+        is_whole && unwritten.is_none() && config.validation.best > 0 && !file.elites.is_empty();
     let validated = match chooses {
         true => {
             let archive = files.folder.path().join(RUN_JSON);
@@ -139,15 +159,27 @@ pub fn evolve(options: &EvolveOptions, session: &Session) -> Result<EvolveOutcom
     };
     let stopped = !is_whole || validated.is_none();
     let validated = validated.unwrap_or_default();
-    Ok(EvolveOutcome { run: file, totals, size, validated, stopped, unwritten })
+    Ok(EvolveOutcome {
+        run: file,
+        totals,
+        size,
+        validated,
+        stopped,
+        unwritten,
+    })
 }
 
 /// Opens the run's metrics.csv to continue after a generation.
 fn metrics(folder: &RunFolder, generation: u64, session: &Session) -> Result<Metrics, Error> {
     let metrics = Metrics::open(folder.path(), generation)?;
     if metrics.missing > 0 {
-        let (path, missing) = (folder.path().join(METRICS).display().to_string(), metrics.missing);
-        session.observer.warning(&format!("{path}: {missing} of {generation} generations are missing in it"));
+        let (path, missing) = (
+            folder.path().join(METRICS).display().to_string(),
+            metrics.missing,
+        );
+        session.observer.warning(&format!(
+            "{path}: {missing} of {generation} generations are missing in it"
+        ));
     }
     Ok(metrics)
 }

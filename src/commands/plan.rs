@@ -60,7 +60,8 @@ impl PaperPlan {
 
     /// Returns the plan as TOML, with the value of every key.
     pub(crate) fn to_toml(&self) -> String {
-        toml::to_string_pretty(self).expect("every field is a number, text, list or table, which TOML has")
+        toml::to_string_pretty(self)
+            .expect("every field is a number, text, list or table, which TOML has")
     }
 
     /// Reads a plan from a file or, if there is none, the built-in one of that name.
@@ -76,17 +77,27 @@ impl PaperPlan {
         let format = reading::Format::of(Path::new(name));
         let plan: PaperPlan = reading::read(&text, format, name)?;
         let folder = Path::new(name).parent().unwrap_or(Path::new(""));
-        let placed = |plan: &PaperPlan| PaperPlan { folder: folder.to_path_buf(), ..plan.clone() };
-        let check = |plan: &PaperPlan| plan.check().and_then(|()| placed(plan).experiments().map(|_| ()));
-        let plan =
-            reading::changed(plan, overrides, check, |error| reading::placed(error, &text, format, name))?;
+        let placed = |plan: &PaperPlan| PaperPlan {
+            folder: folder.to_path_buf(),
+            ..plan.clone()
+        };
+        let check = |plan: &PaperPlan| {
+            plan.check()
+                .and_then(|()| placed(plan).experiments().map(|_| ()))
+        };
+        let plan = reading::changed(plan, overrides, check, |error| {
+            reading::placed(error, &text, format, name)
+        })?;
         Ok(placed(&plan))
     }
 
     fn check(&self) -> Result<(), Error> {
         let refuse = |key: &str, text: &str| Err(Error::input(text.to_string()).with_key(key));
         if self.seeds.is_empty() || self.experiment.is_empty() {
-            return refuse("experiment", "seeds, experiment: expected one or more of each");
+            return refuse(
+                "experiment",
+                "seeds, experiment: expected one or more of each",
+            );
         }
         if self.seeds.iter().collect::<BTreeSet<_>>().len() < self.seeds.len() {
             return refuse("seeds", "seeds: expected different ones");
@@ -94,8 +105,12 @@ impl PaperPlan {
         if self.robots == 0 || self.images == 0 {
             return refuse("images", "robots, images: expected 1 or more");
         }
-        self.audit.check().map_err(|error| error.with_key("audit"))?;
-        self.capacity.check().map_err(|error| error.with_key("capacity"))
+        self.audit
+            .check()
+            .map_err(|error| error.with_key("audit"))?;
+        self.capacity
+            .check()
+            .map_err(|error| error.with_key("capacity"))
     }
 
     /// Returns the experiments: names of their runs, and configs.
@@ -106,20 +121,36 @@ impl PaperPlan {
         let mut experiments = Vec::<(String, Config)>::new();
         for (number, experiment) in (1..).zip(&self.experiment) {
             let key = format!("experiment.{number}");
-            let within = |error: Error| error.in_place(&format!("experiment {number}")).with_key(&key);
+            let within = |error: Error| {
+                error
+                    .in_place(&format!("experiment {number}"))
+                    .with_key(&key)
+            };
             let name = folder::name_of(&self.folder.join(&experiment.config).to_string_lossy());
             if experiments.iter().any(|(other, _)| *other == name) {
-                return Err(within(Error::input(format!("config: {name}: expected once"))));
+                return Err(within(Error::input(format!(
+                    "config: {name}: expected once"
+                ))));
             }
-            if experiment.set.iter().any(|set| set.split('=').next().is_some_and(|key| key.trim() == "seed"))
-            {
-                return Err(within(Error::input("set: seed: expected in seeds".to_string())));
+            if experiment.set.iter().any(|set| {
+                set.split('=')
+                    .next()
+                    .is_some_and(|key| key.trim() == "seed")
+            }) {
+                return Err(within(Error::input(
+                    "set: seed: expected in seeds".to_string(),
+                )));
             }
-            let config =
-                Config::load_from(&self.folder, &experiment.config, &experiment.set).map_err(within)?;
+            let config = Config::load_from(&self.folder, &experiment.config, &experiment.set)
+                .map_err(within)?;
             for &seed in &self.seeds {
-                let seeded = Config { seed, ..config.clone() };
-                seeded.validate().map_err(|error| error.in_place("seeds").with_key("seeds"))?;
+                let seeded = Config {
+                    seed,
+                    ..config.clone()
+                };
+                seeded
+                    .validate()
+                    .map_err(|error| error.in_place("seeds").with_key("seeds"))?;
             }
             let (images, least) = (self.images, config.classes().len());
             if images < least {
@@ -135,12 +166,20 @@ impl PaperPlan {
     #[must_use]
     pub(crate) fn at(&self, scale: f64) -> Self {
         let part = |count: usize, least: usize| {
-            ((count as f64 * scale.sqrt()).round() as usize).max(least).min(count.max(least))
+            ((count as f64 * scale.sqrt()).round() as usize)
+                .max(least)
+                .min(count.max(least))
         };
-        let trainings = part(self.capacity.trainings, LEAST[1].min(self.capacity.trainings));
+        let trainings = part(
+            self.capacity.trainings,
+            LEAST[1].min(self.capacity.trainings),
+        );
         PaperPlan {
             images: part(self.images, LEAST[0].min(self.images)),
-            capacity: CapacityConfig { trainings, ..self.capacity.clone() },
+            capacity: CapacityConfig {
+                trainings,
+                ..self.capacity.clone()
+            },
             ..self.clone()
         }
     }
@@ -149,7 +188,10 @@ impl PaperPlan {
 /// Returns a config with its generations multiplied by `scale`.
 pub(crate) fn scaled(config: &Config, scale: f64) -> Config {
     let generations = ((config.generations as f64 * scale).round() as u64).max(1);
-    Config { generations, ..config.clone() }
+    Config {
+        generations,
+        ..config.clone()
+    }
 }
 
 #[cfg(test)]
@@ -160,7 +202,10 @@ mod tests {
     fn a_small_scale_has_fewer_images_and_trainings_but_never_too_few() {
         let plan = PaperPlan::load(PAPER_TOML.0, &[]).unwrap();
         let sizes = |scale: f64| (plan.at(scale).images, plan.at(scale).capacity.trainings);
-        assert_eq!([1.0, 0.25, 0.01, 1e-6].map(sizes), [(1000, 50), (500, 25), (100, 5), (100, 5)]);
+        assert_eq!(
+            [1.0, 0.25, 0.01, 1e-6].map(sizes),
+            [(1000, 50), (500, 25), (100, 5), (100, 5)]
+        );
         let few = PaperPlan { images: 30, ..plan };
         assert_eq!(few.at(0.01).images, 30);
     }

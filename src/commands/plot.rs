@@ -55,13 +55,19 @@ impl FigureKind {
 
     /// Returns true if the figure shows one robot.
     pub(crate) fn is_of_robot(self) -> bool {
-        matches!(self, FigureKind::Body | FigureKind::Spacetime | FigureKind::Snapshots)
+        matches!(
+            self,
+            FigureKind::Body | FigureKind::Spacetime | FigureKind::Snapshots
+        )
     }
 }
 
 impl fmt::Display for FigureKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        FigureKind::ALL.iter().filter(|(kind, _)| kind == self).try_for_each(|(_, name)| f.write_str(name))
+        FigureKind::ALL
+            .iter()
+            .filter(|(kind, _)| kind == self)
+            .try_for_each(|(_, name)| f.write_str(name))
     }
 }
 
@@ -70,7 +76,9 @@ impl FromStr for FigureKind {
     fn from_str(text: &str) -> Result<Self, String> {
         let found = FigureKind::ALL.iter().find(|(_, name)| *name == text);
         let names = || FigureKind::ALL.map(|(_, name)| name).join(", ");
-        found.map(|(kind, _)| *kind).ok_or_else(|| format!("expected one of {}", names()))
+        found
+            .map(|(kind, _)| *kind)
+            .ok_or_else(|| format!("expected one of {}", names()))
     }
 }
 
@@ -126,14 +134,18 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
         _ => archives.len(),
     };
     if count > 1 && wanted.out.is_some() {
-        return Err(Error::usage(format!("expected with one figure only, these are {count}")).about("out"));
+        return Err(
+            Error::usage(format!("expected with one figure only, these are {count}")).about("out"),
+        );
     }
     let named = |path: &Path, ending: &str| match path.extension() {
         Some(_) => path.to_path_buf(),
         None => with_ending(path, ending),
     };
     if let Some(path) = &wanted.out {
-        endings.iter().try_for_each(|ending| folder::writable(&named(path, ending)))?;
+        endings
+            .iter()
+            .try_for_each(|ending| folder::writable(&named(path, ending)))?;
     }
     let (mut files, mut progress) = (Vec::new(), Vec::new());
     let mut write = |made: Made| -> Result<(), Error> {
@@ -158,7 +170,10 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
     };
     if wanted.kind == FigureKind::Progress {
         let paths: Vec<&Path> = archives.iter().map(PathBuf::as_path).collect();
-        let runs: Vec<RunFile> = paths.iter().map(|path| RunFile::read(path)).collect::<Result<_, _>>()?;
+        let runs: Vec<RunFile> = paths
+            .iter()
+            .map(|path| RunFile::read(path))
+            .collect::<Result<_, _>>()?;
         let named = || paths.iter().copied().zip(&runs);
         different(named())?;
         let (mut lines, mut short) = (Vec::new(), Vec::new());
@@ -171,7 +186,9 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
         }
         match short.first() {
             Some(error) if lines.is_empty() => return Err(error.clone()),
-            _ => short.iter().for_each(|error| session.observer.warning(&format!("{error}; left out"))),
+            _ => short
+                .iter()
+                .for_each(|error| session.observer.warning(&format!("{error}; left out"))),
         }
         let figure = plot::progress(&lines);
         let stem = folder::beside_all(&archives, &format!("plot-{}", wanted.kind));
@@ -183,17 +200,23 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
         }
     } else {
         if wanted.kind == FigureKind::Archive {
-            let runs: Vec<RunFile> =
-                archives.iter().map(|path| RunFile::read(path)).collect::<Result<_, _>>()?;
+            let runs: Vec<RunFile> = archives
+                .iter()
+                .map(|path| RunFile::read(path))
+                .collect::<Result<_, _>>()?;
             different(archives.iter().map(PathBuf::as_path).zip(&runs))?;
         }
         let made = |path: &PathBuf| -> Result<Made, Error> {
             let stem = stem(path, wanted.kind, &result_name(wanted.kind, path));
-            Ok(Made { figure: of_run(wanted.kind, path)?, stem })
+            Ok(Made {
+                figure: of_run(wanted.kind, path)?,
+                stem,
+            })
         };
         let all = archives.iter().map(made).collect::<Result<Vec<_>, _>>()?;
         if let Some(dpi) = wanted.dpi.filter(|_| endings.contains(&"png")) {
-            all.iter().try_for_each(|made| possible(&made.figure, dpi))?;
+            all.iter()
+                .try_for_each(|made| possible(&made.figure, dpi))?;
         }
         all.into_iter().try_for_each(write)?;
     }
@@ -201,7 +224,12 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
 }
 
 /// Encodes a figure as PNG; notes if its resolution is lower than usual.
-fn png(session: &Session, path: &Path, figure: &Figure, dpi: Option<u32>) -> Result<Vec<u8>, Error> {
+fn png(
+    session: &Session,
+    path: &Path,
+    figure: &Figure,
+    dpi: Option<u32>,
+) -> Result<Vec<u8>, Error> {
     if let Some(dpi) = dpi {
         possible(figure, dpi)?;
         return Ok(figure.png(dpi)?);
@@ -209,7 +237,9 @@ fn png(session: &Session, path: &Path, figure: &Figure, dpi: Option<u32>) -> Res
     let fitting = figure.fitting(PRINT);
     if fitting < PRINT {
         let text = format!("{fitting} pixels per inch, because with {PRINT} it would be too large");
-        session.observer.note(&format!("note: {}: {text}", path.display()));
+        session
+            .observer
+            .note(&format!("note: {}: {text}", path.display()));
     }
     Ok(figure.print()?)
 }
@@ -219,7 +249,10 @@ fn possible(figure: &Figure, dpi: u32) -> Result<(), Error> {
     let most = figure.fitting(dpi);
     match most < dpi {
         true => {
-            let text = format!("{}: expected at most {most}, or an .svg file", figure.title());
+            let text = format!(
+                "{}: expected at most {most}, or an .svg file",
+                figure.title()
+            );
             Err(Error::argument("dpi", dpi, text))
         }
         false => Ok(()),
@@ -235,7 +268,11 @@ pub(crate) fn endings(out: Option<&Path>) -> Result<Vec<&'static str>, Error> {
         return Ok(vec!["svg", "png"]);
     };
     folder::of_file(path)?;
-    match path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).as_deref() {
+    match path
+        .extension()
+        .map(|ending| ending.to_string_lossy().to_lowercase())
+        .as_deref()
+    {
         None => Ok(vec!["svg", "png"]),
         Some("svg") => Ok(vec!["svg"]),
         Some("png") => Ok(vec!["png"]),
@@ -255,7 +292,10 @@ fn with_ending(stem: &Path, ending: &str) -> PathBuf {
 
 /// Returns the error for a robot named with a kind of figure that shows none.
 pub(crate) fn no_robot(kind: FigureKind) -> Error {
-    let of_robots = FigureKind::ALL.iter().filter(|(kind, _)| kind.is_of_robot()).map(|(_, name)| *name);
+    let of_robots = FigureKind::ALL
+        .iter()
+        .filter(|(kind, _)| kind.is_of_robot())
+        .map(|(_, name)| *name);
     let of_robots = of_robots.collect::<Vec<_>>().join(", ");
     let text = format!("plot {kind} shows no single robot; expected with {of_robots} only");
     Error::usage(text).about("robot")
@@ -264,17 +304,26 @@ pub(crate) fn no_robot(kind: FigureKind) -> Error {
 /// Returns the error for a run with too few generations for a line.
 fn too_short(path: &Path, run: &RunFile, generations: usize) -> Error {
     let path = path.with_file_name(METRICS);
-    let text = format!("{}: expected at least 2 generations, found {generations}", path.display());
+    let text = format!(
+        "{}: expected at least 2 generations, found {generations}",
+        path.display()
+    );
     match run.origin {
-        Some(_) => Error::input(text)
-            .remedy(Remedy::Run(Invocation::new("plot").value("accuracy"), "shows what its test found")),
+        Some(_) => Error::input(text).remedy(Remedy::Run(
+            Invocation::new("plot").value("accuracy"),
+            "shows what its test found",
+        )),
         None => Error::input(text),
     }
 }
 
 /// `plot-<kind>[-robot]` beside a run.json.
 fn stem(archive: &Path, kind: FigureKind, robot: &str) -> PathBuf {
-    let name = if robot.is_empty() { format!("plot-{kind}") } else { format!("plot-{kind}-{robot}") };
+    let name = if robot.is_empty() {
+        format!("plot-{kind}")
+    } else {
+        format!("plot-{kind}-{robot}")
+    };
     // Published robots have names by which their files are known.
     match archive == published::archive() {
         true => PathBuf::from(name),
@@ -284,8 +333,15 @@ fn stem(archive: &Path, kind: FigureKind, robot: &str) -> PathBuf {
 
 fn of_robot(wanted: &PlotOptions, named: &Named) -> Result<Made, Error> {
     let Named { archive, robot } = named.clone();
-    let options = ReplayOptions { robot, archive: Some(archive.clone()), ..wanted.options.clone() };
-    let made = |found: &FoundRobot, figure| Made { figure, stem: stem(&archive, wanted.kind, &found.name) };
+    let options = ReplayOptions {
+        robot,
+        archive: Some(archive.clone()),
+        ..wanted.options.clone()
+    };
+    let made = |found: &FoundRobot, figure| Made {
+        figure,
+        stem: stem(&archive, wanted.kind, &found.name),
+    };
     if wanted.kind == FigureKind::Body {
         let found = replay::find(&options)?;
         return Ok(made(&found, plot::body(&found.body, &found.title())));
@@ -301,7 +357,11 @@ fn of_robot(wanted: &PlotOptions, named: &Named) -> Result<Made, Error> {
 }
 
 fn of_run(kind: FigureKind, path: &Path) -> Result<Figure, Error> {
-    let maker = if kind == FigureKind::Accuracy { "eval" } else { "capacity" };
+    let maker = if kind == FigureKind::Accuracy {
+        "eval"
+    } else {
+        "capacity"
+    };
     let with_maker = |error: Error| match error.remedies.is_empty() {
         true => error.remedy(Remedy::Run(Invocation::new(maker), "makes it")),
         false => error,
@@ -315,7 +375,10 @@ fn of_run(kind: FigureKind, path: &Path) -> Result<Figure, Error> {
             };
             let (report, path) = (report.map_err(with_maker)?, beside);
             if report.robots.is_empty() {
-                let text = format!("{}: robots: expected at least one, found none", path.display());
+                let text = format!(
+                    "{}: robots: expected at least one, found none",
+                    path.display()
+                );
                 return Err(with_maker(Error::input(text)));
             }
             Ok(plot::accuracy(&report))
@@ -331,7 +394,10 @@ fn of_run(kind: FigureKind, path: &Path) -> Result<Figure, Error> {
                     false => file.run == run.name,
                 };
                 if !is_of_it {
-                    let text = format!("{}: it is about the robots of another run", beside.display());
+                    let text = format!(
+                        "{}: it is about the robots of another run",
+                        beside.display()
+                    );
                     let remedy = Remedy::Run(Invocation::new("capacity"), "makes that of this run");
                     return Err(Error::input(text).remedy(remedy));
                 }
@@ -353,8 +419,9 @@ fn result(path: &Path, name: &str) -> PathBuf {
 /// Returns the part of a figure's name that comes from a directly named result file.
 fn result_name(kind: FigureKind, path: &Path) -> String {
     let is_result = matches!(kind, FigureKind::Accuracy | FigureKind::Capacity);
-    let stem =
-        path.file_stem().filter(|_| is_result && path.file_name().is_some_and(|name| name != RUN_JSON));
+    let stem = path
+        .file_stem()
+        .filter(|_| is_result && path.file_name().is_some_and(|name| name != RUN_JSON));
     stem.map_or(String::new(), |stem| stem.to_string_lossy().into_owned())
 }
 
@@ -365,12 +432,29 @@ mod tests {
     #[test]
     fn kinds_are_named_and_endings_say_the_format() {
         for (kind, name) in FigureKind::ALL {
-            assert_eq!((name.parse::<FigureKind>(), kind.to_string()), (Ok(kind), name.to_string()));
+            assert_eq!(
+                (name.parse::<FigureKind>(), kind.to_string()),
+                (Ok(kind), name.to_string())
+            );
         }
-        assert!("pie".parse::<FigureKind>().unwrap_err().contains("spacetime"));
+        assert!(
+            "pie"
+                .parse::<FigureKind>()
+                .unwrap_err()
+                .contains("spacetime")
+        );
         assert_eq!(endings(Some(Path::new("a.SVG"))).unwrap(), ["svg"]);
         assert_eq!(endings(Some(Path::new("a"))).unwrap(), ["svg", "png"]);
-        assert_eq!(endings(Some(Path::new("a.pdf"))).unwrap_err().kind.exit_code(), 2);
-        assert_eq!(with_ending(Path::new("x/plot-a.b"), "svg"), Path::new("x/plot-a.b.svg"));
+        assert_eq!(
+            endings(Some(Path::new("a.pdf")))
+                .unwrap_err()
+                .kind
+                .exit_code(),
+            2
+        );
+        assert_eq!(
+            with_ending(Path::new("x/plot-a.b"), "svg"),
+            Path::new("x/plot-a.b.svg")
+        );
     }
 }

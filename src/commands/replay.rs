@@ -42,8 +42,10 @@ impl FromStr for ShownImage {
                 return Err(format!("{other}: expected train or test before the colon"));
             }
         };
-        let index =
-            digits.trim().parse().map_err(|_| format!("{text}: expected an index, as 3 or test:17"))?;
+        let index = digits
+            .trim()
+            .parse()
+            .map_err(|_| format!("{text}: expected an index, as 3 or test:17"))?;
         Ok(ShownImage { split, index })
     }
 }
@@ -92,26 +94,59 @@ pub(crate) struct ReplaySubject {
 pub fn replay(options: &ReplayOptions) -> Result<Replay, Error> {
     let subject = subject(options)?;
     let recording = record_subject(&subject);
-    let FoundRobot { name, config, mut about, .. } = subject.found;
+    let FoundRobot {
+        name,
+        config,
+        mut about,
+        ..
+    } = subject.found;
     let fresh = config.protocol.rollout == RolloutMode::Fresh;
     about.push((
         "Images".to_string(),
-        format!("{}, {:?} encoding", config.data.dataset, config.stimulus.encoding).to_lowercase(),
+        format!(
+            "{}, {:?} encoding",
+            config.data.dataset, config.stimulus.encoding
+        )
+        .to_lowercase(),
     ));
-    let rollout = if fresh { "a fresh rollout for every image" } else { "one continuous rollout" };
+    let rollout = if fresh {
+        "a fresh rollout for every image"
+    } else {
+        "one continuous rollout"
+    };
     about.push((
         "Protocol".to_string(),
-        format!("{rollout}, {} control steps each", config.protocol.control_steps),
+        format!(
+            "{rollout}, {} control steps each",
+            config.protocol.control_steps
+        ),
     ));
-    Ok(Replay { recording, about, name })
+    Ok(Replay {
+        recording,
+        about,
+        name,
+    })
 }
 
 /// Records a subject's rollout.
 pub(crate) fn record_subject(subject: &ReplaySubject) -> Recording {
-    let ReplaySubject { found: FoundRobot { name, body, config, judge, .. }, images } = subject;
+    let ReplaySubject {
+        found:
+            FoundRobot {
+                name,
+                body,
+                config,
+                judge,
+                ..
+            },
+        images,
+    } = subject;
     let fresh = config.protocol.rollout == RolloutMode::Fresh;
     let recording = record(name, body, &config.physics, &config.protocol, fresh, images);
-    Recording { judge: judge.clone(), ..recording }
+    Recording {
+        judge: judge.clone(),
+        ..recording
+    }
 }
 
 /// Finds a robot and its images.
@@ -132,38 +167,76 @@ pub(crate) fn subject(options: &ReplayOptions) -> Result<ReplaySubject, Error> {
     };
     let (asks, mut shown) = (!options.images.is_empty(), options.images.clone());
     if shown.is_empty() {
-        let own = if options.dataset.is_none() { found.training.as_slice() } else { &[] };
+        let own = if options.dataset.is_none() {
+            found.training.as_slice()
+        } else {
+            &[]
+        };
         let all = match own {
             [] => {
-                let train = whereabouts.load(&config.data, &[Split::Train]).map_err(offer)?;
+                let train = whereabouts
+                    .load(&config.data, &[Split::Train])
+                    .map_err(offer)?;
                 // Draws no more than are recorded: another dataset may have fewer.
                 let is_shown = |per_class: &usize| per_class * config.classes().len() <= MAX_IMAGES;
-                let images_per_class = Some(config.data.images_per_class).filter(is_shown).unwrap_or(1);
-                let data = DataConfig { images_per_class, ..config.data.clone() };
-                TrainingImages::of(&Config { data, ..config.clone() }, &train)?.images
+                let images_per_class = Some(config.data.images_per_class)
+                    .filter(is_shown)
+                    .unwrap_or(1);
+                let data = DataConfig {
+                    images_per_class,
+                    ..config.data.clone()
+                };
+                TrainingImages::of(
+                    &Config {
+                        data,
+                        ..config.clone()
+                    },
+                    &train,
+                )?
+                .images
             }
             own => own.to_vec(),
         };
-        let training = |image: &ImageRef| ShownImage { split: Split::Train, index: image.index };
+        let training = |image: &ImageRef| ShownImage {
+            split: Split::Train,
+            index: image.index,
+        };
         shown = some(&all).iter().map(training).collect();
     }
     if shown.len() > MAX_IMAGES {
-        let text = format!("{} images, expected at most {MAX_IMAGES} in one recording", shown.len());
+        let text = format!(
+            "{} images, expected at most {MAX_IMAGES} in one recording",
+            shown.len()
+        );
         return Err(Error::usage(text).about("images"));
     }
-    let wanted: Vec<Split> =
-        Split::ALL.into_iter().filter(|split| shown.iter().any(|image| image.split == *split)).collect();
-    let own = found.dataset.as_ref().filter(|own| own.name == config.data.dataset);
+    let wanted: Vec<Split> = Split::ALL
+        .into_iter()
+        .filter(|split| shown.iter().any(|image| image.split == *split))
+        .collect();
+    let own = found
+        .dataset
+        .as_ref()
+        .filter(|own| own.name == config.data.dataset);
     let dataset = load_dataset_of(own, config, &whereabouts, &wanted).map_err(offer)?;
     let mut images = Vec::new();
     for ShownImage { split, index } in shown {
-        let label = dataset.label(split, index).map_err(|error| match (&options.archive, asks) {
-            (_, true) => Error::usage(error.to_string()).about("images"),
-            (Some(path), _) => Error::input(format!("{}: training_images: {error}", path.display())),
-            (None, _) => Error::input(format!("training_images: {error}")),
-        })?;
+        let label =
+            dataset
+                .label(split, index)
+                .map_err(|error| match (&options.archive, asks) {
+                    (_, true) => Error::usage(error.to_string()).about("images"),
+                    (Some(path), _) => {
+                        Error::input(format!("{}: training_images: {error}", path.display()))
+                    }
+                    (None, _) => Error::input(format!("training_images: {error}")),
+                })?;
         let stimulus = see(config, &dataset, split, index)?;
-        images.push(LabelledStimulus { class: label, label: format!("{label} ({split} {index})"), stimulus });
+        images.push(LabelledStimulus {
+            class: label,
+            label: format!("{label} ({split} {index})"),
+            stimulus,
+        });
     }
     config.data.dataset = dataset.name().to_string();
     check_length(config, images.len())?;
@@ -204,7 +277,12 @@ pub struct FoundRobot {
 impl FoundRobot {
     /// Returns the title of its picture, one line: robot, run and seed.
     pub(crate) fn title(&self) -> String {
-        let word = |key: &str| self.about.iter().find(|(word, _)| word == key).map_or("", |(_, value)| value);
+        let word = |key: &str| {
+            self.about
+                .iter()
+                .find(|(word, _)| word == key)
+                .map_or("", |(_, value)| value)
+        };
         format!("robot {}, {}", word("Robot"), word("From"))
     }
 }
@@ -216,7 +294,9 @@ impl FoundRobot {
 pub fn find(options: &ReplayOptions) -> Result<FoundRobot, Error> {
     let ids = Selection::Ids(vec![options.robot.clone()]);
     let (archives, _) = robots::archives(options.archive.iter().cloned().collect(), ids)?;
-    let [archive] = archives.try_into().expect("one is named, or else there is one");
+    let [archive] = archives
+        .try_into()
+        .expect("one is named, or else there is one");
     let source = robots::open(&archive)?;
     let robots = Selection::Ids(vec![options.robot.clone()]).physical(options.physical_only);
     let robots = robots.of(std::slice::from_ref(&source), 0);
@@ -226,15 +306,24 @@ pub fn find(options: &ReplayOptions) -> Result<FoundRobot, Error> {
             return error;
         }
         // Without an archive, the name may mean a published robot.
-        error.remedy(Remedy::Run(Invocation::new("gallery"), "lists the published robots"))
+        error.remedy(Remedy::Run(
+            Invocation::new("gallery"),
+            "lists the published robots",
+        ))
     })?;
     let (robot, run) = (robots[0].robot, &source.run);
     let about = vec![
         ("Robot".to_string(), robot.id.clone()),
-        ("From".to_string(), published::provenance(&run.name, run.config.seed)),
+        (
+            "From".to_string(),
+            published::provenance(&run.name, run.config.seed),
+        ),
         ("Task".to_string(), robot.task.clone()),
         ("Fitness".to_string(), run.in_units(robot.objective)),
-        ("Born".to_string(), format!("generation {}", robot.generation)),
+        (
+            "Born".to_string(),
+            format!("generation {}", robot.generation),
+        ),
     ];
     let (name, body) = (robot.id.clone(), robot.body.clone());
     Ok(FoundRobot {

@@ -63,14 +63,23 @@ pub(crate) struct ReproduceOutcome {
 /// Returns an error if the scale or plan is wrong.
 pub(crate) fn tasks(plan: &PaperPlan, scale: f64) -> Result<Vec<Task>, Error> {
     if !(scale > 0.0 && scale <= 1.0) {
-        return Err(Error::argument("scale", scale, "expected more than 0, up to 1"));
+        return Err(Error::argument(
+            "scale",
+            scale,
+            "expected more than 0, up to 1",
+        ));
     }
     let mut tasks = Vec::new();
     for (name, config) in plan.experiments()? {
         for &seed in &plan.seeds {
-            let config = Config { seed, ..plan::scaled(&config, scale) };
-            let varied =
-                vec![("experiment".to_string(), name.clone()), ("seed".to_string(), seed.to_string())];
+            let config = Config {
+                seed,
+                ..plan::scaled(&config, scale)
+            };
+            let varied = vec![
+                ("experiment".to_string(), name.clone()),
+                ("seed".to_string(), seed.to_string()),
+            ];
             tasks.push(Task {
                 name: format!("{name}-seed{seed}"),
                 run: Run::Evolve(Box::new(config), name.clone(), None),
@@ -87,7 +96,10 @@ pub(crate) fn tasks(plan: &PaperPlan, scale: f64) -> Result<Vec<Task>, Error> {
 ///
 /// # Errors
 /// Returns an error if a check, or a step after the runs, fails.
-pub(crate) fn reproduce(options: &ReproduceOptions, session: &Session) -> Result<ReproduceOutcome, Error> {
+pub(crate) fn reproduce(
+    options: &ReproduceOptions,
+    session: &Session,
+) -> Result<ReproduceOutcome, Error> {
     let tasks = tasks(&options.plan, options.scale)?;
     let place = &options.place;
     tasks::check_folders(&tasks, place).map_err(|mut refused| refused.swap_remove(0))?;
@@ -100,8 +112,14 @@ pub(crate) fn reproduce(options: &ReproduceOptions, session: &Session) -> Result
     let runs = tasks::run_all(&tasks, place, options.jobs, session)?;
     let (rows, capacities) = (Vec::new(), Vec::new());
     let stopped = runs.done < tasks.len();
-    let mut finished =
-        ReproduceOutcome { runs, rows, files: Vec::new(), capacities, stopped, unwritten: None };
+    let mut finished = ReproduceOutcome {
+        runs,
+        rows,
+        files: Vec::new(),
+        capacities,
+        stopped,
+        unwritten: None,
+    };
     if stopped {
         return Ok(finished);
     }
@@ -112,10 +130,17 @@ pub(crate) fn reproduce(options: &ReproduceOptions, session: &Session) -> Result
             return Err(another(&folder, &differing));
         }
     }
-    let job = Job { place, plan: &plan, session };
+    let job = Job {
+        place,
+        plan: &plan,
+        session,
+    };
     for (name, config) in &experiments {
         let Some((found, networks)) = job.experiment(name, config)? else {
-            return Ok(ReproduceOutcome { stopped: true, ..finished });
+            return Ok(ReproduceOutcome {
+                stopped: true,
+                ..finished
+            });
         };
         finished.rows.extend(found);
         finished.capacities.extend(networks);
@@ -142,26 +167,45 @@ struct Job<'a> {
 impl Job<'_> {
     /// Does all steps of an experiment. Returns its rows and networks, or `None` if stopped.
     fn experiment(&self, name: &str, config: &Config) -> Result<Option<Experienced>, Error> {
-        let of_seed =
-            |seed: &u64| StoredRun::read(&self.place.out.join(format!("{name}-seed{seed}")).join(RUN_JSON));
-        let sources: Vec<StoredRun> = self.plan.seeds.iter().map(of_seed).collect::<Result<_, _>>()?;
+        let of_seed = |seed: &u64| {
+            StoredRun::read(
+                &self
+                    .place
+                    .out
+                    .join(format!("{name}-seed{seed}"))
+                    .join(RUN_JSON),
+            )
+        };
+        let sources: Vec<StoredRun> = self
+            .plan
+            .seeds
+            .iter()
+            .map(of_seed)
+            .collect::<Result<_, _>>()?;
         let Some((chosen, audited)) = self.chosen(&sources)? else {
             return Ok(None);
         };
         let (tasks, grouping) = (&sources[0].run.dimensions.tasks, config.grouping()?);
         let tasks: Vec<&String> = tasks
             .iter()
-            .filter(|task| grouping.tasks().iter().any(|s| s.name() == **task && !s.is_same_way()))
+            .filter(|task| {
+                grouping
+                    .tasks()
+                    .iter()
+                    .any(|s| s.name() == **task && !s.is_same_way())
+            })
             .collect();
-        let mut rows: Vec<TableRow> =
-            tasks.iter().map(|task| TableRow::new(&config.data.dataset, task)).collect();
+        let mut rows: Vec<TableRow> = tasks
+            .iter()
+            .map(|task| TableRow::new(&config.data.dataset, task))
+            .collect();
         for row in &mut rows {
             (row.physical, row.audited) = audited.get(&row.task).copied().unwrap_or((0, 0));
         }
         if chosen.is_empty() {
-            self.session
-                .observer
-                .note(&format!("{name}: every robot exploits the simulator: nothing to test"));
+            self.session.observer.note(&format!(
+                "{name}: every robot exploits the simulator: nothing to test"
+            ));
             return Ok(Some((rows, None)));
         }
         let path = self.place.out.join(format!("{name}-eval.json"));
@@ -192,9 +236,16 @@ impl Job<'_> {
         let all = Selection::All.of(sources, 0)?;
         let grouping = sources[0].run.config.grouping()?;
         let (mut chosen, mut counts) = (Vec::new(), BTreeMap::new());
-        for (number, split) in (0..).zip(grouping.tasks()).filter(|(_, split)| !split.is_same_way()) {
+        for (number, split) in (0..)
+            .zip(grouping.tasks())
+            .filter(|(_, split)| !split.is_same_way())
+        {
             let task = split.name();
-            let of_task: Vec<Chosen> = all.iter().filter(|c| c.robot.task == task).copied().collect();
+            let of_task: Vec<Chosen> = all
+                .iter()
+                .filter(|c| c.robot.task == task)
+                .copied()
+                .collect();
             let order = stream(1, Purpose::Robots, 1, number).sample(of_task.len(), of_task.len());
             let (mut physical, mut others, mut audited) = (Vec::new(), Vec::new(), 0);
             for turn in order.chunks(self.plan.robots) {
@@ -202,9 +253,10 @@ impl Job<'_> {
                     break;
                 }
                 let drawn: Vec<Chosen> = turn.iter().map(|&index| of_task[index]).collect();
-                self.session
-                    .observer
-                    .note(&format!("{task}: audit of {}", counted(drawn.len(), "robot", "robots")));
+                self.session.observer.note(&format!(
+                    "{task}: audit of {}",
+                    counted(drawn.len(), "robot", "robots")
+                ));
                 let Some(verdicts) = self.audited(sources, &drawn)? else {
                     return Ok(None);
                 };
@@ -255,7 +307,8 @@ impl Job<'_> {
             }
             files.insert(number, file);
         }
-        let verdict = |chosen: &Chosen| Some(files.get(&chosen.source)?.robot(&chosen.robot.id)?.verdict);
+        let verdict =
+            |chosen: &Chosen| Some(files.get(&chosen.source)?.robot(&chosen.robot.id)?.verdict);
         Ok(Some(robots.iter().map(verdict).collect()))
     }
 
@@ -267,7 +320,10 @@ impl Job<'_> {
         sources: &[StoredRun],
         chosen: &[Chosen],
     ) -> Result<Option<EvalFile>, Error> {
-        let ids: Vec<(usize, String)> = chosen.iter().map(|c| (c.source, c.robot.id.clone())).collect();
+        let ids: Vec<(usize, String)> = chosen
+            .iter()
+            .map(|c| (c.source, c.robot.id.clone()))
+            .collect();
         let about = format!(
             "{} elites of each task, drawn at random, physical ones first, none that exploits the simulator",
             self.plan.robots

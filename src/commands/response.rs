@@ -107,7 +107,10 @@ struct Provenance {
 ///
 /// # Errors
 /// Returns an error if the archive, robots, data or options are wrong.
-pub(crate) fn measure(options: &ResponseOptions, session: &Session) -> Result<ResponseOutcome, Error> {
+pub(crate) fn measure(
+    options: &ResponseOptions,
+    session: &Session,
+) -> Result<ResponseOutcome, Error> {
     check_numbers(options)?;
     let provenance = provenance(options)?;
     let config = &provenance.config;
@@ -115,7 +118,10 @@ pub(crate) fn measure(options: &ResponseOptions, session: &Session) -> Result<Re
     let mut refused: Vec<Error> = Vec::new();
     for (id, body) in &provenance.robots {
         match Gait::of(body) {
-            Some(gait) => subjects.push(Subject { id: id.clone(), gait }),
+            Some(gait) => subjects.push(Subject {
+                id: id.clone(),
+                gait,
+            }),
             None => refused.push(Error::input(format!(
                 "robot {id}: it has neither soft voxels nor sensors, so no image can move it"
             ))),
@@ -143,7 +149,11 @@ pub(crate) fn measure(options: &ResponseOptions, session: &Session) -> Result<Re
         && before.run_sha256 == provenance.sha256
         && before.setting.seed != seed
     {
-        let count = counted(before.robots.len(), "robot of this run is", "robots of this run are");
+        let count = counted(
+            before.robots.len(),
+            "robot of this run is",
+            "robots of this run are",
+        );
         let text = format!(
             "{}: {count} measured with the random images of seed {}",
             path.display(),
@@ -152,15 +162,37 @@ pub(crate) fn measure(options: &ResponseOptions, session: &Session) -> Result<Re
         let error = Error::input(text).remedy(Remedy::ChooseOut);
         return Err(error.remedy(Remedy::MeasureWithSeed(before.setting.seed)));
     }
-    let measuring =
-        Measuring { options, config, probing, task, earlier, run_sha256: &provenance.sha256, seed, session };
+    let measuring = Measuring {
+        options,
+        config,
+        probing,
+        task,
+        earlier,
+        run_sha256: &provenance.sha256,
+        seed,
+        session,
+    };
     let asked: Vec<&str> = subjects.iter().map(|subject| subject.id.as_str()).collect();
     let drawn = pictures(&options.out, &asked);
     if !subjects.is_empty() {
-        let known: usize = subjects.iter().map(|subject| measuring.known(&subject.gait).0.len()).sum();
-        let kept = if known > 0 { format!(" ({known} rollouts known from before)") } else { String::new() };
-        let label = format!("measuring {}{kept}:", counted(subjects.len(), "robot", "robots"));
-        session.observer.begins(&Work::new(label, (subjects.len() * options.images) as u64, "rollouts"));
+        let known: usize = subjects
+            .iter()
+            .map(|subject| measuring.known(&subject.gait).0.len())
+            .sum();
+        let kept = if known > 0 {
+            format!(" ({known} rollouts known from before)")
+        } else {
+            String::new()
+        };
+        let label = format!(
+            "measuring {}{kept}:",
+            counted(subjects.len(), "robot", "robots")
+        );
+        session.observer.begins(&Work::new(
+            label,
+            (subjects.len() * options.images) as u64,
+            "rollouts",
+        ));
     }
     let mut unwritten = Unwritten::default();
     let mut stopped = false;
@@ -169,7 +201,9 @@ pub(crate) fn measure(options: &ResponseOptions, session: &Session) -> Result<Re
         let found = pool.install(|| {
             measuring.robot(subject, &mut displacements, &mut |rollouts, skipped| {
                 session.observer.skips(skipped as u64);
-                session.observer.progress((number * options.images + rollouts) as u64);
+                session
+                    .observer
+                    .progress((number * options.images + rollouts) as u64);
             })
         });
         match found {
@@ -190,7 +224,8 @@ pub(crate) fn measure(options: &ResponseOptions, session: &Session) -> Result<Re
         if !file.robots.is_empty() || !file.unfinished.is_empty() {
             // Another process may have measured robots of this run meanwhile.
             let before = replaced::<ResponseFile>(&options.out);
-            let whole = before.map(|before| before.map_or_else(|| file.clone(), |b| file.with_others_of(&b)));
+            let whole = before
+                .map(|before| before.map_or_else(|| file.clone(), |b| file.with_others_of(&b)));
             let is_new = |id: &str| file.robots.iter().any(|robot| robot.id == id);
             let outdated = asked.iter().zip(&drawn).filter(|(id, _)| is_new(id));
             let outdated: Vec<[PathBuf; 2]> = outdated.map(|(_, files)| files.clone()).collect();
@@ -205,29 +240,52 @@ pub(crate) fn measure(options: &ResponseOptions, session: &Session) -> Result<Re
         return Err(match refused.as_slice() {
             [one] => one.clone().remedy(Remedy::ChooseRobots(None)),
             several => {
-                let text =
-                    format!("none of the {} chosen robots can be measured: {}", several.len(), several[0]);
+                let text = format!(
+                    "none of the {} chosen robots can be measured: {}",
+                    several.len(),
+                    several[0]
+                );
                 Error::input(text).remedy(Remedy::ChooseRobots(None))
             }
         });
     }
-    refused.iter().for_each(|error| session.observer.warning(&format!("{error}; left out")));
+    refused
+        .iter()
+        .for_each(|error| session.observer.warning(&format!("{error}; left out")));
     let ids: Vec<&str> = file.robots.iter().map(|robot| robot.id.as_str()).collect();
     let pictures = pictures(&options.out, &ids);
-    Ok(ResponseOutcome { pictures, file, stopped, unwritten: unwritten.error() })
+    Ok(ResponseOutcome {
+        pictures,
+        file,
+        stopped,
+        unwritten: unwritten.error(),
+    })
 }
 
 fn check_numbers(options: &ResponseOptions) -> Result<(), Error> {
-    let ResponseOptions { images, error, seed, .. } = options;
+    let ResponseOptions {
+        images,
+        error,
+        seed,
+        ..
+    } = options;
     if !(BATCH..=MOST_RANDOM_IMAGES).contains(images) {
         let text = format!("expected {BATCH} to {MOST_RANDOM_IMAGES} random images");
         return Err(Error::argument("images", images, text).advice("with fewer, no slope is known"));
     }
     if !(0.0..1.0).contains(error) {
-        return Err(Error::argument("error", error, "expected 0 or more, and below 1"));
+        return Err(Error::argument(
+            "error",
+            error,
+            "expected 0 or more, and below 1",
+        ));
     }
     if let Some(seed) = seed.filter(|seed| *seed > MAX_NUMBER) {
-        return Err(Error::argument("seed", seed, format!("expected at most {MAX_NUMBER}")));
+        return Err(Error::argument(
+            "seed",
+            seed,
+            format!("expected at most {MAX_NUMBER}"),
+        ));
     }
     Ok(())
 }
@@ -236,12 +294,18 @@ fn check_numbers(options: &ResponseOptions) -> Result<(), Error> {
 fn check_names(options: &ResponseOptions, subjects: &[Subject]) -> Result<(), Error> {
     let out = &options.out;
     check_out(out, &options.archive, RESPONSE_JSON)?;
-    if PICTURES.iter().any(|ending| out.with_extension(ending) == *out) {
+    if PICTURES
+        .iter()
+        .any(|ending| out.with_extension(ending) == *out)
+    {
         let text = "expected another ending: the picture beside the results has that name";
         return Err(Error::argument("out", out.display(), text));
     }
     let ids: Vec<&str> = subjects.iter().map(|subject| subject.id.as_str()).collect();
-    pictures(out, &ids).iter().flatten().try_for_each(|picture| writable(picture))
+    pictures(out, &ids)
+        .iter()
+        .flatten()
+        .try_for_each(|picture| writable(picture))
 }
 
 /// Returns the requested robots, each once, and their run.
@@ -251,7 +315,10 @@ fn provenance(options: &ResponseOptions) -> Result<Provenance, Error> {
     let chosen = Selection::Ids(options.robots.clone()).physical(options.physical_only);
     let seed = options.seed.unwrap_or(source.run.config.seed);
     let chosen = chosen.of(std::slice::from_ref(&source), seed)?;
-    let robots = chosen.iter().map(|chosen| (chosen.robot.id.clone(), chosen.robot.body.clone())).collect();
+    let robots = chosen
+        .iter()
+        .map(|chosen| (chosen.robot.id.clone(), chosen.robot.body.clone()))
+        .collect();
     let sha256 = source.run.fingerprint();
     let run = &source.run;
     Ok(Provenance {
@@ -265,7 +332,12 @@ fn provenance(options: &ResponseOptions) -> Result<Provenance, Error> {
 
 /// Returns the conditions of `train`, at most one per rollout.
 fn conditions(config: &Config, rollouts: usize) -> Vec<Condition> {
-    config.train.perturbations.conditions().take(rollouts).collect()
+    config
+        .train
+        .perturbations
+        .conditions()
+        .take(rollouts)
+        .collect()
 }
 
 /// A task that robots could be trained for.
@@ -288,38 +360,75 @@ fn task(
     let Some(groups) = &options.task else {
         return Ok(None);
     };
-    let config = training::config_of(&provenance.config, groups.classes(), Some(seed), &options.set)?;
+    let config = training::config_of(
+        &provenance.config,
+        groups.classes(),
+        Some(seed),
+        &options.set,
+    )?;
     let whereabouts = Whereabouts::given(session.folder()).and_of(&options.archive);
     same_walks(&provenance.config, &config)?;
     let data = |config: &Config| {
-        let DataConfig { dataset, dir, transpose, builtin, .. } = &config.data;
+        let DataConfig {
+            dataset,
+            dir,
+            transpose,
+            builtin,
+            ..
+        } = &config.data;
         (dataset.clone(), dir.clone(), *transpose, builtin.clone())
     };
     let of_run = Some(&provenance.dataset).filter(|_| data(&config) == data(&provenance.config));
     let dataset = load_dataset_of(of_run, &config, &whereabouts, &[Split::Train])?;
     training::check_groups(groups, &dataset)?;
     say_transposed(&dataset, &config.data, session);
-    let config =
-        training::sized(config, &provenance.dataset, &provenance.config, &dataset, &options.set, session);
+    let config = training::sized(
+        config,
+        &provenance.dataset,
+        &provenance.config,
+        &dataset,
+        &options.set,
+        session,
+    );
     let classes = groups.classes().concat();
     let per_class = IMAGES_PER_CLASS.min(scarcest(&dataset, &classes, LEAST_PER_CLASS)?);
     let failed = |error: DatasetError| Error::input(error.to_string());
-    let drawn = dataset.draw(Split::Train, &classes, per_class, seed).map_err(failed)?;
-    let labels = classes.iter().flat_map(|class| std::iter::repeat_n(*class, per_class));
-    let images = labels.zip(drawn).map(|(label, index)| ImageRef { index, label }).collect();
-    let task = Task { groups: groups.clone(), config, dataset, images };
+    let drawn = dataset
+        .draw(Split::Train, &classes, per_class, seed)
+        .map_err(failed)?;
+    let labels = classes
+        .iter()
+        .flat_map(|class| std::iter::repeat_n(*class, per_class));
+    let images = labels
+        .zip(drawn)
+        .map(|(label, index)| ImageRef { index, label })
+        .collect();
+    let task = Task {
+        groups: groups.clone(),
+        config,
+        dataset,
+        images,
+    };
     // Images that cannot be seen must be refused before anything is measured.
-    task.images.first().map_or(Ok(()), |image| task.seen(&task.config.stimulus, image).map(drop))?;
+    task.images.first().map_or(Ok(()), |image| {
+        task.seen(&task.config.stimulus, image).map(drop)
+    })?;
     Ok(Some(task))
 }
 
 /// Checks that a training would simulate as the run did: the measurement holds for no other.
 fn same_walks(of_run: &Config, training: &Config) -> Result<(), Error> {
-    let steps = |config: &Config| Protocol { rollout: RolloutMode::Fresh, ..config.protocol.clone() };
+    let steps = |config: &Config| Protocol {
+        rollout: RolloutMode::Fresh,
+        ..config.protocol.clone()
+    };
     let differing = [
         ("physics", of_run.physics != training.physics),
         ("protocol", steps(of_run) != steps(training)),
-        ("train.perturbations", of_run.train.perturbations != training.train.perturbations),
+        (
+            "train.perturbations",
+            of_run.train.perturbations != training.train.perturbations,
+        ),
     ];
     match differing.into_iter().find(|(_, differs)| *differs) {
         None => Ok(()),
@@ -332,8 +441,13 @@ fn same_walks(of_run: &Config, training: &Config) -> Result<(), Error> {
 }
 
 fn reference(dataset: &Dataset) -> DatasetRef {
-    let train_sha256 = dataset.fingerprint(Split::Train).expect("its images were read just now");
-    DatasetRef { name: dataset.name().to_string(), train_sha256 }
+    let train_sha256 = dataset
+        .fingerprint(Split::Train)
+        .expect("its images were read just now");
+    DatasetRef {
+        name: dataset.name().to_string(),
+        train_sha256,
+    }
 }
 
 fn setting(
@@ -358,7 +472,13 @@ fn setting(
 
 impl Task {
     fn seen(&self, stimulus: &StimulusParams, image: &ImageRef) -> Result<Grid<f64>, Error> {
-        seen(&self.config.body, stimulus, &self.dataset, Split::Train, image.index)
+        seen(
+            &self.config.body,
+            stimulus,
+            &self.dataset,
+            Split::Train,
+            image.index,
+        )
     }
 
     /// Estimates the accuracy that training could reach, under the best window.
@@ -381,11 +501,30 @@ impl Task {
         let ways = balanced(self.images.iter().map(|image| image.label), first);
         let example = |(image, (right, weight)): (&ImageRef, (f64, f64))| {
             let seen = self.seen(&stimulus, image)?;
-            Ok(Example { right, weight, ..Example::new(gait, &seen, &config.physics) })
+            Ok(Example {
+                right,
+                weight,
+                ..Example::new(gait, &seen, &config.physics)
+            })
         };
-        let examples = self.images.iter().zip(ways).map(example).collect::<Result<Vec<Example>, Error>>()?;
-        let found = teachable(shown, response.scatter, &examples, answer::THRESHOLD, config.seed, session)?;
-        Ok(found.map(|teachable| TrainingEstimate { margin, ..teachable.into() }))
+        let examples = self
+            .images
+            .iter()
+            .zip(ways)
+            .map(example)
+            .collect::<Result<Vec<Example>, Error>>()?;
+        let found = teachable(
+            shown,
+            response.scatter,
+            &examples,
+            answer::THRESHOLD,
+            config.seed,
+            session,
+        )?;
+        Ok(found.map(|teachable| TrainingEstimate {
+            margin,
+            ..teachable.into()
+        }))
     }
 }
 
@@ -404,10 +543,15 @@ struct Measuring<'a> {
 
 /// Returns earlier results to reuse, from the results' file and from beside the run. Fails if the
 /// results' file cannot be read.
-fn earlier(options: &ResponseOptions, session: &Session) -> Result<Vec<(PathBuf, ResponseFile)>, Error> {
+fn earlier(
+    options: &ResponseOptions,
+    session: &Session,
+) -> Result<Vec<(PathBuf, ResponseFile)>, Error> {
     let out = replaced(&options.out)?.map(|file| (options.out.clone(), file));
-    let beside = Some(options.archive.with_file_name(RESPONSE_JSON)).filter(|beside| *beside != options.out);
-    let beside = beside.and_then(|path| ResponseFile::found(&path, session).map(|file| (path, file)));
+    let beside =
+        Some(options.archive.with_file_name(RESPONSE_JSON)).filter(|beside| *beside != options.out);
+    let beside =
+        beside.and_then(|path| ResponseFile::found(&path, session).map(|file| (path, file)));
     Ok(beside.into_iter().chain(out).collect())
 }
 
@@ -416,11 +560,20 @@ impl Measuring<'_> {
     /// them belong to a finished measurement.
     fn known(&self, gait: &Gait) -> (&[Option<f64>], usize) {
         let conditions = self.probing.conditions();
-        let of_files =
-            self.earlier.iter().map(|(_, file)| file.known(self.run_sha256, self.seed, conditions, gait));
+        let of_files = self
+            .earlier
+            .iter()
+            .map(|(_, file)| file.known(self.run_sha256, self.seed, conditions, gait));
         // All begin with the same images.
         of_files.fold((&[], 0), |(known, ended), (other, other_ended)| {
-            (if other.len() > known.len() { other } else { known }, ended.max(other_ended))
+            (
+                if other.len() > known.len() {
+                    other
+                } else {
+                    known
+                },
+                ended.max(other_ended),
+            )
         })
     }
 
@@ -433,7 +586,13 @@ impl Measuring<'_> {
         displacements: &mut Vec<Option<f64>>,
         progress: &mut dyn FnMut(usize, usize),
     ) -> Result<Option<RobotResponse>, Error> {
-        let Measuring { options, config, probing, session, .. } = self;
+        let Measuring {
+            options,
+            config,
+            probing,
+            session,
+            ..
+        } = self;
         let (known, ended) = self.known(gait);
         let mut shown: Vec<RandomRollout> = Vec::new();
         // The rollouts of a finished measurement cost nothing: they are taken whole, and first. A
@@ -444,22 +603,30 @@ impl Measuring<'_> {
             let numbers = rollouts..most.min(ended.max(rollouts + BATCH));
             rollouts = numbers.end;
             let known = &known[numbers.start.min(known.len())..numbers.end.min(known.len())];
-            shown.extend(probing.shown(gait, &config.physics, numbers, |probe, stimuli, conditions| {
-                let before = displacements.len();
-                displacements.extend(known);
-                let (rolled, _, ended) = fresh_rollouts_so_far(
-                    probe,
-                    &stimuli[known.len()..],
-                    &conditions[known.len()..],
-                    (&config.physics, &config.protocol),
-                    &|_| (),
-                    session,
-                );
-                displacements.extend(rolled.into_iter().map(Result::ok));
-                ended?;
-                Ok::<_, Error>(displacements[before..].to_vec())
-            })?);
-            progress(rollouts.min(options.images), known.len().min(options.images));
+            shown.extend(probing.shown(
+                gait,
+                &config.physics,
+                numbers,
+                |probe, stimuli, conditions| {
+                    let before = displacements.len();
+                    displacements.extend(known);
+                    let (rolled, _, ended) = fresh_rollouts_so_far(
+                        probe,
+                        &stimuli[known.len()..],
+                        &conditions[known.len()..],
+                        (&config.physics, &config.protocol),
+                        &|_| (),
+                        session,
+                    );
+                    displacements.extend(rolled.into_iter().map(Result::ok));
+                    ended?;
+                    Ok::<_, Error>(displacements[before..].to_vec())
+                },
+            )?);
+            progress(
+                rollouts.min(options.images),
+                known.len().min(options.images),
+            );
             session.check()?;
             let Some(response) = probing::response(&shown, rollouts) else {
                 return Ok(None);
@@ -471,12 +638,25 @@ impl Measuring<'_> {
             } else {
                 continue;
             };
-            progress(options.images, options.images - rollouts.min(options.images));
-            let taught =
-                self.task.as_ref().map(|task| task.taught(gait, &response, &shown, session)).transpose()?;
+            progress(
+                options.images,
+                options.images - rollouts.min(options.images),
+            );
+            let taught = self
+                .task
+                .as_ref()
+                .map(|task| task.taught(gait, &response, &shown, session))
+                .transpose()?;
             let taught = taught.flatten();
             let displacements = std::mem::take(displacements);
-            return Ok(Some(RobotResponse::new(id, gait, &response, displacements, ended_by, taught)));
+            return Ok(Some(RobotResponse::new(
+                id,
+                gait,
+                &response,
+                displacements,
+                ended_by,
+                taught,
+            )));
         }
     }
 }

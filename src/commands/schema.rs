@@ -50,7 +50,12 @@ const fn of_config<T: JsonSchema>(name: &'static str, of: &'static str) -> Schem
 }
 
 const fn of<T: JsonSchema>(name: &'static str, of: &'static str, version: u32) -> Schema {
-    Schema { name, of, version, make: made::<T> }
+    Schema {
+        name,
+        of,
+        version,
+        make: made::<T>,
+    }
 }
 
 impl Schema {
@@ -59,10 +64,12 @@ impl Schema {
     /// # Errors
     /// Returns an error if there is none.
     pub(crate) fn named(name: &str) -> Result<Self, Error> {
-        ALL.into_iter().find(|schema| schema.name == name).ok_or_else(|| {
-            let names = ALL.map(|schema| schema.name).join(", ");
-            Error::usage(format!("schema {name}: expected one of {names}"))
-        })
+        ALL.into_iter()
+            .find(|schema| schema.name == name)
+            .ok_or_else(|| {
+                let names = ALL.map(|schema| schema.name).join(", ");
+                Error::usage(format!("schema {name}: expected one of {names}"))
+            })
     }
 
     /// Returns it as JSON Schema draft 7, which most editors know.
@@ -77,7 +84,10 @@ impl Schema {
 }
 
 fn made<T: JsonSchema>() -> Value {
-    SchemaSettings::draft07().into_generator().into_root_schema_for::<T>().to_value()
+    SchemaSettings::draft07()
+        .into_generator()
+        .into_root_schema_for::<T>()
+        .to_value()
 }
 
 /// Removes the markup of Rust's documentation from descriptions.
@@ -113,7 +123,9 @@ fn without_links(text: &str) -> String {
             "\n" => plain.push(' '),
             _ => {
                 let (name, after) = rest.split_once(']').unwrap_or((rest, ""));
-                let target = after.strip_prefix('(').and_then(|target| target.split_once(')'));
+                let target = after
+                    .strip_prefix('(')
+                    .and_then(|target| target.split_once(')'));
                 match target {
                     Some((_, after)) => {
                         plain.push_str(name);
@@ -138,7 +150,10 @@ mod tests {
     #[test]
     fn descriptions_lose_links_line_breaks_and_escapes_and_nothing_else() {
         let text = "A [`Body`] of\nrows \\[wu\\], see [there](crate::x) and [−1, 1].";
-        assert_eq!(without_links(text), "A `Body` of rows [wu], see there and [−1, 1].");
+        assert_eq!(
+            without_links(text),
+            "A `Body` of rows [wu], see there and [−1, 1]."
+        );
         assert_eq!(without_links("a ] b [ c"), "a ] b [ c");
     }
 
@@ -146,7 +161,9 @@ mod tests {
     fn an_unknown_schema_is_refused_with_those_that_there_are() {
         let error = Schema::named("rnu").unwrap_err();
         assert!(
-            error.message.contains("config, sweep, plan, audit-config, capacity-config, run, eval, audit"),
+            error
+                .message
+                .contains("config, sweep, plan, audit-config, capacity-config, run, eval, audit"),
             "{error}"
         );
     }

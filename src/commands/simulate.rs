@@ -60,7 +60,10 @@ fn bounded<'de, D: Deserializer<'de>>(reader: D) -> Result<Option<Vec<Grid<f64>>
                 bytes += stimulus.area() * size_of::<f64>() + 16 + 2 * size_of::<Grid<f64>>();
                 if bytes > MOST_STIMULI {
                     let (count, pixels) = (stimuli.len(), stimulus.area());
-                    let (most, each) = (MOST_STIMULI >> 20, if pixels == 1 { "pixel" } else { "pixels" });
+                    let (most, each) = (
+                        MOST_STIMULI >> 20,
+                        if pixels == 1 { "pixel" } else { "pixels" },
+                    );
                     return Err(A::Error::custom(format!(
                         "expected stimuli that need at most {most} MB of memory: {count} of {pixels} {each} do"
                     )));
@@ -123,19 +126,25 @@ impl Scenario {
 
     fn check(&self) -> Result<(), Error> {
         let refuse = |text: String| Err(Error::input(text));
-        self.physics.validate().map_err(|error| Error::input(format!("physics.{error}")))?;
+        self.physics
+            .validate()
+            .map_err(|error| Error::input(format!("physics.{error}")))?;
         if self.body.counts().total == 0 {
             return refuse("body: expected at least one voxel that is not empty".to_string());
         }
         match (&self.stimulus, &self.stimuli, self.switch_every) {
             (Some(_), Some(_), _) => {
-                return refuse("stimuli: expected either stimulus or stimuli, not both".to_string());
+                return refuse(
+                    "stimuli: expected either stimulus or stimuli, not both".to_string(),
+                );
             }
             (_, Some(stimuli), _) if stimuli.is_empty() => {
                 return refuse("stimuli: expected at least one stimulus".to_string());
             }
             (_, Some(_), None | Some(0)) => {
-                return refuse("switch_every: expected 1 or more control steps with stimuli".to_string());
+                return refuse(
+                    "switch_every: expected 1 or more control steps with stimuli".to_string(),
+                );
             }
             (_, None, Some(_)) => {
                 return refuse("switch_every: expected only with stimuli".to_string());
@@ -146,8 +155,11 @@ impl Scenario {
             _ => {}
         }
         for (index, stimulus) in self.stimuli().iter().enumerate() {
-            let key =
-                if self.stimuli.is_some() { format!("stimuli[{index}]") } else { "stimulus".to_string() };
+            let key = if self.stimuli.is_some() {
+                format!("stimuli[{index}]")
+            } else {
+                "stimulus".to_string()
+            };
             let (height, width) = (self.body.height(), self.body.width());
             if (stimulus.height(), stimulus.width()) != (height, width) {
                 let (rows, columns) = (stimulus.height(), stimulus.width());
@@ -155,23 +167,39 @@ impl Scenario {
                     "{key}: {rows} × {columns} pixels, expected {height} × {width} as the body"
                 ));
             }
-            if let Some(((row, column), pixel)) =
-                stimulus.iter().find(|(_, pixel)| !(0.0..=1.0).contains(*pixel))
+            if let Some(((row, column), pixel)) = stimulus
+                .iter()
+                .find(|(_, pixel)| !(0.0..=1.0).contains(*pixel))
             {
-                return refuse(format!("{key}: row {row}, column {column}: {pixel}, expected 0 to 1"));
+                return refuse(format!(
+                    "{key}: row {row}, column {column}: {pixel}, expected 0 to 1"
+                ));
             }
         }
         let ground = self.physics.ground_row;
-        if let Some(row) = self.start_row.filter(|row| !(ground..=MAX_ROW).contains(row)) {
-            return refuse(format!("start_row: {row}, expected {ground} (on the ground) to {MAX_ROW}"));
+        if let Some(row) = self
+            .start_row
+            .filter(|row| !(ground..=MAX_ROW).contains(row))
+        {
+            return refuse(format!(
+                "start_row: {row}, expected {ground} (on the ground) to {MAX_ROW}"
+            ));
         }
         if self.control_steps() > u64::from(MAX_STEPS) {
-            let key = if self.control_steps.is_some() { "control_steps" } else { "switch_every" };
+            let key = if self.control_steps.is_some() {
+                "control_steps"
+            } else {
+                "switch_every"
+            };
             let steps = self.control_steps();
-            return refuse(format!("{key}: {steps} control steps in all, expected at most {MAX_STEPS}"));
+            return refuse(format!(
+                "{key}: {steps} control steps in all, expected at most {MAX_STEPS}"
+            ));
         }
         if !(-MAX_COLUMN..=MAX_COLUMN).contains(&self.start_column) {
-            return refuse(format!("start_column: expected −{MAX_COLUMN} to {MAX_COLUMN}"));
+            return refuse(format!(
+                "start_column: expected −{MAX_COLUMN} to {MAX_COLUMN}"
+            ));
         }
         Ok(())
     }
@@ -183,7 +211,10 @@ impl Scenario {
 
     /// Returns the position where it begins.
     pub(crate) fn start(&self) -> Start {
-        Start { column: self.start_column, row: self.start_row.unwrap_or(self.physics.ground_row) }
+        Start {
+            column: self.start_column,
+            row: self.start_row.unwrap_or(self.physics.ground_row),
+        }
     }
 
     /// Returns the constants of the simulator.
@@ -193,7 +224,9 @@ impl Scenario {
 
     /// Returns the number of control steps.
     pub(crate) fn control_steps(&self) -> u64 {
-        let shown = self.switch_every.map(|every| every.saturating_mul(self.stimuli().len() as u64));
+        let shown = self
+            .switch_every
+            .map(|every| every.saturating_mul(self.stimuli().len() as u64));
         self.control_steps.or(shown).unwrap_or(CONTROL_STEPS)
     }
 }
@@ -218,15 +251,21 @@ pub fn simulate(
     let mut header = "step,com_x,com_y".to_string();
     if points {
         (0..world.points().count()).for_each(|number| header += &format!(",x_{number},y_{number}"));
-        dark.iter().for_each(|((row, column), _)| header += &format!(",pixel_{row}_{column}"));
+        dark.iter()
+            .for_each(|((row, column), _)| header += &format!(",pixel_{row}_{column}"));
     }
     line(header + "\n")?;
     let mut row = |step: u64, world: &World, shown: &Grid<f64>| {
         let [x, y] = world.centre_of_mass();
         let mut text = format!("{step},{},{}", digits17(x + offset), digits17(y));
         if points {
-            world.points().for_each(|[x, y]| text += &format!(",{},{}", digits17(x + offset), digits17(y)));
-            shown.cells().iter().for_each(|pixel| text += &format!(",{pixel}"));
+            world
+                .points()
+                .for_each(|[x, y]| text += &format!(",{},{}", digits17(x + offset), digits17(y)));
+            shown
+                .cells()
+                .iter()
+                .for_each(|pixel| text += &format!(",{pixel}"));
         }
         line(text + "\n")
     };
@@ -244,7 +283,10 @@ pub fn simulate(
         }
         world.step().map_err(|unstable| {
             // Resets restart the simulation's own clock; errors count the scenario's steps.
-            let unstable = crate::sim::Unstable { control_step: step, ..unstable };
+            let unstable = crate::sim::Unstable {
+                control_step: step,
+                ..unstable
+            };
             Error::unstable(unstable.to_string())
         })?;
         row(step + 1, &world, shown)?;
@@ -257,7 +299,12 @@ pub fn simulate(
 /// # Errors
 /// As [`Scenario::read`] and [`simulate`]; if the file cannot be written or is the scenario's; if
 /// the session was stopped, which leaves the file unchanged.
-pub(crate) fn to_file(from: &Path, points: bool, path: &Path, session: &Session) -> Result<(), Error> {
+pub(crate) fn to_file(
+    from: &Path,
+    points: bool,
+    path: &Path,
+    session: &Session,
+) -> Result<(), Error> {
     let scenario = &Scenario::read(from)?;
     if path.exists() && path.canonicalize().ok() == from.canonicalize().ok() {
         let text = "expected another name: this would overwrite the scenario";
@@ -282,7 +329,10 @@ pub(crate) fn to_file(from: &Path, points: bool, path: &Path, session: &Session)
         failed.map_or_else(|| file.flush(), Err)
     });
     if matches!(&outcome, Err(error) if error.kind == ErrorKind::Stopped) {
-        return Err(Error::stopped(format!("stopped; {} is not written", path.display())));
+        return Err(Error::stopped(format!(
+            "stopped; {} is not written",
+            path.display()
+        )));
     }
     written.map_err(|error| Error::writing(path, &error))?;
     outcome
@@ -292,7 +342,11 @@ pub(crate) fn to_file(from: &Path, points: bool, path: &Path, session: &Session)
 pub(crate) fn digits17(value: f64) -> String {
     // Makes -0 into 0.
     let value = value + 0.0;
-    let before = if value == 0.0 { 0.0 } else { libm::log10(value.abs()).floor() };
+    let before = if value == 0.0 {
+        0.0
+    } else {
+        libm::log10(value.abs()).floor()
+    };
     let decimals = (16.0 - before).clamp(0.0, 40.0) as usize;
     format!("{value:.decimals$}")
 }
@@ -303,10 +357,22 @@ mod tests {
 
     #[test]
     fn seventeen_digits_name_every_number() {
-        for value in
-            [19.9605633802817, 1.0 / 3.0, 1e-9, -123456.789, 0.1 + 0.2, 0.0, 1e20, 9.99999999999999999]
-        {
-            assert_eq!(digits17(value).parse::<f64>().unwrap(), value, "{}", digits17(value));
+        for value in [
+            19.9605633802817,
+            1.0 / 3.0,
+            1e-9,
+            -123456.789,
+            0.1 + 0.2,
+            0.0,
+            1e20,
+            9.99999999999999999,
+        ] {
+            assert_eq!(
+                digits17(value).parse::<f64>().unwrap(),
+                value,
+                "{}",
+                digits17(value)
+            );
         }
         assert_eq!(digits17(0.5), "0.50000000000000000");
     }
@@ -329,7 +395,8 @@ mod tests {
         assert!(refused("{\"body\": [[3]], \"stimuli\": [[[1]]]}").contains("switch_every"));
         assert!(refused("{\"body\": [[3]], \"start_row\": 1}").contains("start_row"));
         assert!(refused("{\"body\": [[3]], \"stimuli\": 7}").contains("a list"));
-        let null = Scenario::parse("{\"body\": [[3]], \"stimuli\": null}", "scenario.json").unwrap();
+        let null =
+            Scenario::parse("{\"body\": [[3]], \"stimuli\": null}", "scenario.json").unwrap();
         assert!(null.stimuli().is_empty());
     }
 
@@ -338,28 +405,46 @@ mod tests {
         // Forty million of them, a file of 240 MB, took 3.7 GB. This endless file must be refused
         // while it is read.
         let many = 2_000_000;
-        let text = format!("{{\"body\": [[3]], \"switch_every\": 1, \"stimuli\": [{}", "[[1]],".repeat(many));
+        let text = format!(
+            "{{\"body\": [[3]], \"switch_every\": 1, \"stimuli\": [{}",
+            "[[1]],".repeat(many)
+        );
         let error = Scenario::parse(&text, "scenario.json").unwrap_err().message;
-        assert!(error.starts_with("scenario.json:1: stimuli") && error.contains("128 MB"), "{error}");
+        assert!(
+            error.starts_with("scenario.json:1: stimuli") && error.contains("128 MB"),
+            "{error}"
+        );
         let some = format!(
             "{{\"body\": [[3]], \"switch_every\": 1, \"stimuli\": [{}[[1]]]}}",
             "[[1]],".repeat(99_999)
         );
-        assert_eq!(Scenario::parse(&some, "scenario.json").unwrap().control_steps(), 100_000);
+        assert_eq!(
+            Scenario::parse(&some, "scenario.json")
+                .unwrap()
+                .control_steps(),
+            100_000
+        );
     }
 
     #[test]
     fn a_scenario_that_would_not_end_is_refused_with_its_key() {
         let refused = |keys: &str| refused(&format!("{{\"body\": [[3]], {keys}}}"));
-        let blown = "\"physics\": {\"blow_up_extent\": 1e10, \"time_step\": 0.5}, \"control_steps\": 2";
+        let blown =
+            "\"physics\": {\"blow_up_extent\": 1e10, \"time_step\": 0.5}, \"control_steps\": 2";
         assert!(
-            refused(blown).contains("physics.blow_up_extent = 10000000000: expected at most 1000 times cell")
+            refused(blown)
+                .contains("physics.blow_up_extent = 10000000000: expected at most 1000 times cell")
         );
         let substeps = refused("\"physics\": {\"substeps\": 4000000000}");
-        assert!(substeps.contains("physics.substeps = 4000000000: expected a whole number from 1 to 1000"));
+        assert!(
+            substeps
+                .contains("physics.substeps = 4000000000: expected a whole number from 1 to 1000")
+        );
         assert!(refused("\"control_steps\": 1000001").contains("control_steps: 1000001"));
         let shown = refused("\"stimuli\": [[[1]], [[0]]], \"switch_every\": 600000");
-        assert!(shown.contains("switch_every: 1200000 control steps in all, expected at most 1000000"));
+        assert!(
+            shown.contains("switch_every: 1200000 control steps in all, expected at most 1000000")
+        );
         assert!(refused("\"start_row\": 4000000000").contains("start_row: 4000000000, expected 2"));
     }
 }

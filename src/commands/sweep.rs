@@ -84,7 +84,10 @@ impl SweepPlan {
     /// Returns an error with file, line and key if the plan is wrong.
     pub(crate) fn load(path: &Path, overrides: &[String]) -> Result<Self, Error> {
         let text = read_given(path).map_err(|error| {
-            let schema = Remedy::Run(Invocation::new("schema").value("sweep"), "says what a plan holds");
+            let schema = Remedy::Run(
+                Invocation::new("schema").value("sweep"),
+                "says what a plan holds",
+            );
             let help = Remedy::Run(Invocation::new("help").value("sweep"), "shows one");
             Error::reading(path, &error).remedy(schema).remedy(help)
         })?;
@@ -92,20 +95,31 @@ impl SweepPlan {
         let format = reading::Format::of(path);
         let plan: SweepPlan = reading::read(&text, format, &name)?;
         let check = |plan: &SweepPlan| plan.check();
-        reading::changed(plan, overrides, check, |error| reading::placed(error, &text, format, &name))
+        reading::changed(plan, overrides, check, |error| {
+            reading::placed(error, &text, format, &name)
+        })
     }
 
     /// Checks what the types cannot, but no task.
     fn check(&self) -> Result<(), Error> {
         match (&self.config, &self.archive) {
             (Some(_), Some(_)) => {
-                return Err(Error::at_key("archive", "expected config or archive, not both"));
+                return Err(Error::at_key(
+                    "archive",
+                    "expected config or archive, not both",
+                ));
             }
             (None, None) => {
-                return Err(Error::at_key("config", "expected config (to evolve) or archive (to train)"));
+                return Err(Error::at_key(
+                    "config",
+                    "expected config (to evolve) or archive (to train)",
+                ));
             }
             (Some(_), None) if self.robots.is_some() => {
-                return Err(Error::at_key("robots", "expected with archive only: these robots are trained"));
+                return Err(Error::at_key(
+                    "robots",
+                    "expected with archive only: these robots are trained",
+                ));
             }
             _ => {}
         }
@@ -116,8 +130,16 @@ impl SweepPlan {
             true => Ok(()),
             false => Err(Error::at_key(key, "expected different ones")),
         };
-        distinct("seeds", self.seeds.len(), self.seeds.iter().collect::<BTreeSet<_>>().len())?;
-        distinct("pairs", self.pairs.len(), self.pairs.iter().collect::<BTreeSet<_>>().len())?;
+        distinct(
+            "seeds",
+            self.seeds.len(),
+            self.seeds.iter().collect::<BTreeSet<_>>().len(),
+        )?;
+        distinct(
+            "pairs",
+            self.pairs.len(),
+            self.pairs.iter().collect::<BTreeSet<_>>().len(),
+        )?;
         if self.pairs.len() == 1 {
             return Err(Error::at_key("pairs", "expected two or more classes"));
         }
@@ -127,7 +149,10 @@ impl SweepPlan {
     }
 
     fn steps(&self) -> Steps {
-        Steps { audit: self.audit.clone(), eval: self.eval.clone() }
+        Steps {
+            audit: self.audit.clone(),
+            eval: self.eval.clone(),
+        }
     }
 
     /// Returns the two groups of each task, if the plan names any.
@@ -135,21 +160,36 @@ impl SweepPlan {
         let mut all: Vec<Groups> = Vec::new();
         for (number, text) in (1..).zip(&self.groups) {
             all.push(
-                text.parse().map_err(|error: String| Error::at_key(&format!("groups.{number}"), error))?,
+                text.parse()
+                    .map_err(|error: String| Error::at_key(&format!("groups.{number}"), error))?,
             );
         }
         for (k, &a) in self.pairs.iter().enumerate() {
-            all.extend(self.pairs[k + 1..].iter().map(|&b| [vec![a.min(b)], vec![a.max(b)]].into()));
+            all.extend(
+                self.pairs[k + 1..]
+                    .iter()
+                    .map(|&b| [vec![a.min(b)], vec![a.max(b)]].into()),
+            );
         }
         // Robots choose which group walks which way, so 1|0 is 0|1.
         let same = |groups: &Groups| -> BTreeSet<BTreeSet<u8>> {
-            groups.classes().iter().map(|group| group.iter().copied().collect()).collect()
+            groups
+                .classes()
+                .iter()
+                .map(|group| group.iter().copied().collect())
+                .collect()
         };
         if all.iter().map(same).collect::<BTreeSet<_>>().len() < all.len() {
-            return Err(Error::at_key("groups", "expected different ones, also of pairs"));
+            return Err(Error::at_key(
+                "groups",
+                "expected different ones, also of pairs",
+            ));
         }
         if self.archive.is_some() && all.is_empty() {
-            return Err(Error::at_key("groups", "expected groups or pairs, which are trained"));
+            return Err(Error::at_key(
+                "groups",
+                "expected groups or pairs, which are trained",
+            ));
         }
         Ok(all)
     }
@@ -163,15 +203,26 @@ impl SweepPlan {
         let mut all = Vec::new();
         for (key, values) in &flat {
             let place = format!("vary.{key}");
-            let has_own = matches!(key.as_str(), "seed" | "task.groups") || key.starts_with("task.groups.");
+            let has_own =
+                matches!(key.as_str(), "seed" | "task.groups") || key.starts_with("task.groups.");
             if has_own {
-                return Err(Error::at_key(&place, "expected in seeds, or in groups and pairs"));
+                return Err(Error::at_key(
+                    &place,
+                    "expected in seeds, or in groups and pairs",
+                ));
             }
             let Some(values) = values.as_array().filter(|values| !values.is_empty()) else {
-                return Err(Error::at_key(&place, "expected a list of one value or more"));
+                return Err(Error::at_key(
+                    &place,
+                    "expected a list of one value or more",
+                ));
             };
             // Two keys may end in the same word.
-            let is_short = flat.keys().filter(|other| short(other) == short(key)).count() == 1;
+            let is_short = flat
+                .keys()
+                .filter(|other| short(other) == short(key))
+                .count()
+                == 1;
             let name = if is_short { short(key) } else { key.clone() };
             let setting = |value: &toml::Value| Setting {
                 key: key.clone(),
@@ -179,7 +230,13 @@ impl SweepPlan {
                 word: format!("{name}={}", word(value)),
             };
             let settings: Vec<Setting> = values.iter().map(setting).collect();
-            if settings.iter().map(|s| &s.word).collect::<BTreeSet<_>>().len() < settings.len() {
+            if settings
+                .iter()
+                .map(|s| &s.word)
+                .collect::<BTreeSet<_>>()
+                .len()
+                < settings.len()
+            {
                 return Err(Error::at_key(&place, "expected different values"));
             }
             all.push(settings);
@@ -195,14 +252,19 @@ impl SweepPlan {
     pub(crate) fn tasks(&self, path: &Path) -> Result<Vec<Task>, Vec<Error>> {
         let one = |error: Error| vec![error.in_place(&path.display().to_string())];
         let sets = |wanted: &dyn Fn(&str) -> bool| {
-            self.set.iter().any(|set| set.split('=').next().is_some_and(|key| wanted(key.trim())))
+            self.set
+                .iter()
+                .any(|set| set.split('=').next().is_some_and(|key| wanted(key.trim())))
         };
         if sets(&|key| key == "seed") {
             return Err(one(Error::at_key("set", "seed: expected in seeds")));
         }
         let has_groups = !(self.groups.is_empty() && self.pairs.is_empty());
         if has_groups && sets(&|key| key == "task" || key.starts_with("task.")) {
-            return Err(one(Error::at_key("set", "task: expected without, since groups or pairs say it")));
+            return Err(one(Error::at_key(
+                "set",
+                "task: expected without, since groups or pairs say it",
+            )));
         }
         let base = self.base(path).map_err(one)?;
         let (groups, varied) = (self.groups().map_err(one)?, self.varied().map_err(one)?);
@@ -211,19 +273,33 @@ impl SweepPlan {
             (Base::Train(_, source), []) => vec![source.run.config.seed],
             (_, seeds) => seeds.to_vec(),
         };
-        let sizes = varied.iter().map(Vec::len).chain([groups.len().max(1), seeds.len()]);
-        if sizes.clone().try_fold(1_usize, usize::checked_mul).is_none_or(|count| count > MOST) {
+        let sizes = varied
+            .iter()
+            .map(Vec::len)
+            .chain([groups.len().max(1), seeds.len()]);
+        if sizes
+            .clone()
+            .try_fold(1_usize, usize::checked_mul)
+            .is_none_or(|count| count > MOST)
+        {
             let sizes: Vec<String> = sizes.map(|size| size.to_string()).collect();
             let text = format!("{} tasks: expected at most {MOST}", sizes.join(" × "));
             return Err(one(Error::at_key("vary", text)));
         }
-        let groups: Vec<Option<&Groups>> =
-            if groups.is_empty() { vec![None] } else { groups.iter().map(Some).collect() };
+        let groups: Vec<Option<&Groups>> = if groups.is_empty() {
+            vec![None]
+        } else {
+            groups.iter().map(Some).collect()
+        };
         let mut combinations: Vec<Vec<&Setting>> = vec![Vec::new()];
         for settings in &varied {
             let mut longer = Vec::new();
             for before in &combinations {
-                longer.extend(settings.iter().map(|setting| [&before[..], &[setting]].concat()));
+                longer.extend(
+                    settings
+                        .iter()
+                        .map(|setting| [&before[..], &[setting]].concat()),
+                );
             }
             combinations = longer;
         }
@@ -243,15 +319,24 @@ impl SweepPlan {
             return Err(refused.errors().into_iter().flat_map(one).collect());
         }
         let mut names = BTreeSet::new();
-        if let Some(task) = tasks.iter().find(|task| !names.insert(task.name.to_lowercase())) {
-            return Err(one(Error::at_key("vary", format!("two tasks would be called {}", task.name))));
+        if let Some(task) = tasks
+            .iter()
+            .find(|task| !names.insert(task.name.to_lowercase()))
+        {
+            return Err(one(Error::at_key(
+                "vary",
+                format!("two tasks would be called {}", task.name),
+            )));
         }
         // Two values may be equal, such as 1 and 1.0.
         let mut experiments: BTreeMap<String, &str> = BTreeMap::new();
         for task in &tasks {
             let config = sha256_hex(format!("{:?}", task.run.config()).as_bytes());
             if let Some(other) = experiments.insert(config, &task.name) {
-                let text = format!("{other} and {} are the same: expected different values", task.name);
+                let text = format!(
+                    "{other} and {} are the same: expected different values",
+                    task.name
+                );
                 return Err(one(Error::at_key("vary", text)));
             }
         }
@@ -262,21 +347,31 @@ impl SweepPlan {
         let folder = path.parent().unwrap_or(Path::new(""));
         if let Some(archive) = &self.archive {
             let is_named = shipped::is_named(archive);
-            let archive = if is_named { archive.clone() } else { folder.join(home_expanded(archive)) };
+            let archive = if is_named {
+                archive.clone()
+            } else {
+                folder.join(home_expanded(archive))
+            };
             let archive = one_run(archive).map_err(|text| Error::at_key("archive", text))?;
-            let source =
-                StoredRun::read(&archive).map_err(|error| error.in_place("archive").with_key("archive"))?;
+            let source = StoredRun::read(&archive)
+                .map_err(|error| error.in_place("archive").with_key("archive"))?;
             let archive = match is_named {
                 true => archive,
-                false => std::path::absolute(&archive).map_err(|error| Error::reading(&archive, &error))?,
+                false => std::path::absolute(&archive)
+                    .map_err(|error| Error::reading(&archive, &error))?,
             };
             return Ok(Base::Train(archive, Box::new(source)));
         }
-        let config =
-            self.config.as_deref().expect("a plan without an archive has a config, which is checked");
+        let config = self
+            .config
+            .as_deref()
+            .expect("a plan without an archive has a config, which is checked");
         let loaded = Config::load_from(folder, config, &[]);
         let loaded = loaded.map_err(|error| error.in_place("config").with_key("config"))?;
-        Ok(Base::Evolve(folder::name_of(&folder.join(config).to_string_lossy()), Box::new(loaded)))
+        Ok(Base::Evolve(
+            folder::name_of(&folder.join(config).to_string_lossy()),
+            Box::new(loaded),
+        ))
     }
 
     fn task(
@@ -287,7 +382,9 @@ impl SweepPlan {
         groups: Option<&Groups>,
         seed: u64,
     ) -> Result<Task, Error> {
-        let settings = combination.iter().map(|setting| format!("{}={}", setting.key, setting.value));
+        let settings = combination
+            .iter()
+            .map(|setting| format!("{}={}", setting.key, setting.value));
         let mut set: Vec<String> = self.set.iter().cloned().chain(settings).collect();
         let run = match base {
             Base::Evolve(config_name, config) => {
@@ -309,7 +406,8 @@ impl SweepPlan {
             }
             Base::Train(archive, source) => {
                 let groups = groups.cloned().expect("a plan with an archive has groups");
-                let config = training::config_of(&source.run.config, groups.classes(), Some(seed), &set)?;
+                let config =
+                    training::config_of(&source.run.config, groups.classes(), Some(seed), &set)?;
                 Run::Train(Box::new(TrainRun {
                     archive: archive.clone(),
                     sha256: source.run.fingerprint(),
@@ -330,11 +428,18 @@ impl SweepPlan {
                 &format!("{classes} or more, one of each class"),
             ));
         }
-        let mut varied: Vec<(String, String)> =
-            combination.iter().map(|setting| (setting.key.clone(), text(&setting.value))).collect();
+        let mut varied: Vec<(String, String)> = combination
+            .iter()
+            .map(|setting| (setting.key.clone(), text(&setting.value)))
+            .collect();
         varied.extend(groups.map(|groups| ("groups".to_string(), groups.to_string())));
         varied.push(("seed".to_string(), seed.to_string()));
-        Ok(Task { name: name.to_string(), run, steps: self.steps(), varied })
+        Ok(Task {
+            name: name.to_string(),
+            run,
+            steps: self.steps(),
+            varied,
+        })
     }
 }
 
@@ -346,32 +451,50 @@ impl Base {
                 Some((_, run)) => run.to_string(),
                 None => {
                     let folder = archive.parent().and_then(Path::file_name);
-                    folder.map_or(source.run.name.clone(), |name| name.to_string_lossy().into_owned())
+                    folder.map_or(source.run.name.clone(), |name| {
+                        name.to_string_lossy().into_owned()
+                    })
                 }
             },
         };
         let words = combination.iter().map(|setting| setting.word.clone());
-        let groups = groups.map(Groups::classes).map(|[a, b]| groups_text([a, b], "v"));
-        let parts = std::iter::once(base).chain(words).chain(groups).chain([format!("seed{seed}")]);
+        let groups = groups
+            .map(Groups::classes)
+            .map(|[a, b]| groups_text([a, b], "v"));
+        let parts = std::iter::once(base)
+            .chain(words)
+            .chain(groups)
+            .chain([format!("seed{seed}")]);
         parts.collect::<Vec<_>>().join("-")
     }
 }
 
 /// Formats a value; strings lose their quotes.
 fn text(value: &toml::Value) -> String {
-    value.as_str().map_or_else(|| value.to_string(), str::to_string)
+    value
+        .as_str()
+        .map_or_else(|| value.to_string(), str::to_string)
 }
 
 /// Formats a value for a file name, so that shells and file systems take it unchanged.
 fn word(value: &toml::Value) -> String {
     let text = text(value);
     let plain = |c: char| {
-        if c.is_ascii_alphanumeric() || "._+-".contains(c) { c } else { '_' }
+        if c.is_ascii_alphanumeric() || "._+-".contains(c) {
+            c
+        } else {
+            '_'
+        }
     };
     let word: String = text.chars().map(plain).collect();
     let is_same = word == text && !word.is_empty() && word.len() <= LONGEST;
     // Two texts that become the same word are still two values.
-    let hash = || sha256_hex(text.as_bytes()).chars().take(8).collect::<String>();
+    let hash = || {
+        sha256_hex(text.as_bytes())
+            .chars()
+            .take(8)
+            .collect::<String>()
+    };
     if is_same { word } else { hash() }
 }
 
@@ -386,7 +509,11 @@ struct Refused {
 impl Refused {
     fn add(&mut self, number: usize, name: &str, error: Error) {
         self.count += 1;
-        match self.by_error.iter_mut().find(|(known, ..)| known.message == error.message) {
+        match self
+            .by_error
+            .iter_mut()
+            .find(|(known, ..)| known.message == error.message)
+        {
             Some((.., more)) => *more += 1,
             None => self.by_error.push((error, number, name.to_string(), 0)),
         }
@@ -394,9 +521,16 @@ impl Refused {
 
     fn errors(self) -> Vec<Error> {
         let said = |(error, number, name, more): (Error, usize, String, usize)| {
-            let others = if more == 0 { String::new() } else { format!(" and {more} more") };
-            Error { kind: crate::base::error::ErrorKind::Input, ..error }
-                .in_place(&format!("task {number} ({name}){others}"))
+            let others = if more == 0 {
+                String::new()
+            } else {
+                format!(" and {more} more")
+            };
+            Error {
+                kind: crate::base::error::ErrorKind::Input,
+                ..error
+            }
+            .in_place(&format!("task {number} ({name}){others}"))
         };
         self.by_error.into_iter().map(said).collect()
     }
@@ -424,9 +558,18 @@ mod tests {
              [vary]\nmap_elites.parents = [10, 20]\nstimulus.encoding = [\"saturated\", \"intensity\"]",
         );
         assert_eq!(names.len(), 2 * 2 * 3 * 2);
-        assert_eq!(names[0], "quickstart-parents=10-encoding=saturated-0v1-seed1");
-        assert_eq!(names[1], "quickstart-parents=10-encoding=saturated-0v1-seed2");
-        assert_eq!(names[23], "quickstart-parents=20-encoding=intensity-1v4-seed2");
+        assert_eq!(
+            names[0],
+            "quickstart-parents=10-encoding=saturated-0v1-seed1"
+        );
+        assert_eq!(
+            names[1],
+            "quickstart-parents=10-encoding=saturated-0v1-seed2"
+        );
+        assert_eq!(
+            names[23],
+            "quickstart-parents=20-encoding=intensity-1v4-seed2"
+        );
     }
 
     #[test]
@@ -434,7 +577,9 @@ mod tests {
         let text = "config = \"four_digit.toml\"\nseeds = [7]\ngroups = [\"0|123\"]\nset = [\"generations=9\"]\n\
                     [vary]\narchive.keep = [3]";
         let tasks = plan(text).tasks(Path::new("plan.toml")).unwrap();
-        let Run::Evolve(config, ..) = &tasks[0].run else { panic!("it evolves") };
+        let Run::Evolve(config, ..) = &tasks[0].run else {
+            panic!("it evolves")
+        };
         assert_eq!((config.seed, config.generations), (7, 9));
         assert_eq!(config.task.groups, Some([vec![0], vec![1, 2, 3]]));
     }
@@ -444,13 +589,21 @@ mod tests {
         let text = "config = \"quickstart.toml\"\nseeds = [1, 2]\n[vary]\ngenerations = [0, 5, -1]\nbody.heihgt = [3]";
         let errors = plan(text).tasks(Path::new("plan.toml")).unwrap_err();
         let said: Vec<String> = errors.iter().map(ToString::to_string).collect();
-        assert_eq!(said.len(), 1, "an unknown key is the first thing wrong with every task: {said:?}");
-        assert!(said[0].contains("heihgt") && said[0].contains("and 5 more"), "{said:?}");
+        assert_eq!(
+            said.len(),
+            1,
+            "an unknown key is the first thing wrong with every task: {said:?}"
+        );
+        assert!(
+            said[0].contains("heihgt") && said[0].contains("and 5 more"),
+            "{said:?}"
+        );
         let text = text.replace("body.heihgt = [3]", "");
         let errors = plan(&text).tasks(Path::new("plan.toml")).unwrap_err();
         let said: Vec<String> = errors.iter().map(ToString::to_string).collect();
         assert!(
-            said.len() == 2 && said[0].contains("task 1 (quickstart-generations=0-seed1) and 1 more"),
+            said.len() == 2
+                && said[0].contains("task 1 (quickstart-generations=0-seed1) and 1 more"),
             "{said:?}"
         );
         assert!(said[1].contains("task 5 "), "{said:?}");
@@ -462,35 +615,64 @@ mod tests {
             ("seeds = [1]", "config"),
             ("config = \"a\"\narchive = \"b\"", "archive"),
             ("config = \"a\"\nrobots = \"top:2\"", "robots"),
-            ("archive = \"a\"\nrobots = \"some\\u003a2\"\npairs = [0, 1]", "robots"),
+            (
+                "archive = \"a\"\nrobots = \"some\\u003a2\"\npairs = [0, 1]",
+                "robots",
+            ),
             ("archive = \"a\"", "groups"),
             ("config = \"a\"\nseeds = [1, 1]", "seeds"),
             ("config = \"a\"\npairs = [3]", "pairs"),
             ("config = \"a\"\ngroups = [\"0|0\"]", "groups.1"),
-            ("config = \"a\"\ngroups = [\"0|1\"]\npairs = [0, 1]", "groups"),
+            (
+                "config = \"a\"\ngroups = [\"0|1\"]\npairs = [0, 1]",
+                "groups",
+            ),
             ("config = \"a\"\ngroups = [\"10|2\", \"2|01\"]", "groups"),
             (
                 "config = \"a\"\n[audit]\nrobots = \"top:3\"\n[eval]\nphysical_only = true",
                 "eval.physical_only",
             ),
             ("config = \"a\"\n[vary]\nseed = [1]", "vary.seed"),
-            ("config = \"a\"\n[vary]\ngenerations = 5", "vary.generations"),
-            ("config = \"a\"\n[vary]\ngenerations = []", "vary.generations"),
-            ("config = \"a\"\n[vary]\ngenerations = [5, 5]", "vary.generations"),
-            ("config = \"a\"\n[eval]\nphysical_only = true", "eval.physical_only"),
+            (
+                "config = \"a\"\n[vary]\ngenerations = 5",
+                "vary.generations",
+            ),
+            (
+                "config = \"a\"\n[vary]\ngenerations = []",
+                "vary.generations",
+            ),
+            (
+                "config = \"a\"\n[vary]\ngenerations = [5, 5]",
+                "vary.generations",
+            ),
+            (
+                "config = \"a\"\n[eval]\nphysical_only = true",
+                "eval.physical_only",
+            ),
         ] {
             let plan: SweepPlan = toml::from_str(text).unwrap();
-            assert_eq!(plan.check().unwrap_err().key.as_deref(), Some(key), "{text}");
+            assert_eq!(
+                plan.check().unwrap_err().key.as_deref(),
+                Some(key),
+                "{text}"
+            );
         }
     }
 
     #[test]
     fn values_that_are_one_and_the_same_are_refused() {
-        for vary in ["archive.qd_offset = [1, 1.0]", "stimulus.margin = [0, [0, 0, 0, 0]]"] {
-            let text = format!("config = \"quickstart.toml\"\n[vary]\n{vary}\ngenerations = [5, 6]");
+        for vary in [
+            "archive.qd_offset = [1, 1.0]",
+            "stimulus.margin = [0, [0, 0, 0, 0]]",
+        ] {
+            let text =
+                format!("config = \"quickstart.toml\"\n[vary]\n{vary}\ngenerations = [5, 6]");
             let errors = plan(&text).tasks(Path::new("plan.toml")).unwrap_err();
             let said = errors[0].to_string();
-            assert!(said.contains("are the same: expected different values"), "{said}");
+            assert!(
+                said.contains("are the same: expected different values"),
+                "{said}"
+            );
         }
         let text = "config = \"quickstart.toml\"\n[vary]\narchive.qd_offset = [1, 1.5]";
         assert_eq!(names(text).len(), 2);
@@ -498,8 +680,16 @@ mod tests {
 
     #[test]
     fn a_lone_class_above_nine_has_a_task_of_its_own() {
-        let names = names("config = \"quickstart.toml\"\ngroups = [\"1|26\", \"1|26,\"]\npairs = [3, 12]");
-        assert_eq!(names, ["quickstart-1v26-seed1", "quickstart-1v26,-seed1", "quickstart-3v12,-seed1"]);
+        let names =
+            names("config = \"quickstart.toml\"\ngroups = [\"1|26\", \"1|26,\"]\npairs = [3, 12]");
+        assert_eq!(
+            names,
+            [
+                "quickstart-1v26-seed1",
+                "quickstart-1v26,-seed1",
+                "quickstart-3v12,-seed1"
+            ]
+        );
     }
 
     #[test]
@@ -509,18 +699,27 @@ mod tests {
             ("set = [\"task.groups=[[5],[6]]\"]\npairs = [0, 1]", "task"),
             ("[eval]\nimages = 1", "eval.images"),
         ] {
-            let errors = plan(&format!("config = \"quickstart.toml\"\n{text}")).tasks(Path::new("plan.toml"));
+            let errors = plan(&format!("config = \"quickstart.toml\"\n{text}"))
+                .tasks(Path::new("plan.toml"));
             let said = errors.unwrap_err()[0].to_string();
             assert!(said.contains(key), "{said}");
         }
-        assert_eq!(names("config = \"quickstart.toml\"\nset = [\"task.groups=[[5],[6]]\"]").len(), 1);
+        assert_eq!(
+            names("config = \"quickstart.toml\"\nset = [\"task.groups=[[5],[6]]\"]").len(),
+            1
+        );
         let names = names("archive = \"gallery:gaits-6\"\npairs = [0, 1]\nseeds = [1]");
-        assert_eq!(names, ["gaits-6-0v1-seed1"], "no name that means another run");
+        assert_eq!(
+            names,
+            ["gaits-6-0v1-seed1"],
+            "no name that means another run"
+        );
     }
 
     #[test]
     fn values_that_no_file_name_takes_have_a_short_name_of_their_own() {
-        let of = |text: &str| word(&format!("value = {text}").parse::<toml::Table>().unwrap()["value"]);
+        let of =
+            |text: &str| word(&format!("value = {text}").parse::<toml::Table>().unwrap()["value"]);
         let [a, b] = ["[[1, 2], [3]]", "[[1, 2], [4]]"].map(of);
         assert!(a != b && a.len() == 8);
         assert_eq!(of("1e-3"), "0.001");

@@ -71,10 +71,15 @@ impl TableRow {
             self.robots = mean.robots;
             self.accuracy = Some(100.0 * mean.accuracy);
             self.deviation = mean.standard_deviation.map(|share| 100.0 * share);
-            self.interval = mean.interval.map(|shares| shares.map(|share| 100.0 * share));
+            self.interval = mean
+                .interval
+                .map(|shares| shares.map(|share| 100.0 * share));
             self.balanced_accuracy = Some(100.0 * mean.balanced_accuracy);
         }
-        self.larger_group = report.baselines.get(&self.task).map(|known| 100.0 * known.larger_group);
+        self.larger_group = report
+            .baselines
+            .get(&self.task)
+            .map(|known| 100.0 * known.larger_group);
         let task = capacity.tasks.iter().find(|task| task.task == self.task);
         let of = |network: &str| task?.size_of(network)?;
         (self.mlp, self.cnn) = (of("mlp"), of("cnn"));
@@ -90,22 +95,48 @@ pub(crate) fn write(folder: &Path, scale: f64, rows: &[TableRow]) -> Result<Vec<
     let json = folder.join("reproduction.json");
     write_file(&json, format!("{about:#}\n").as_bytes())?;
     let csv = folder.join("reproduction.csv");
-    let about = ["task", "robots", "physical", "audited", "accuracy", "deviation"];
-    let shares = ["accuracy_low", "accuracy_high", "balanced_accuracy", "larger_group", "mlp", "cnn"];
+    let about = [
+        "task",
+        "robots",
+        "physical",
+        "audited",
+        "accuracy",
+        "deviation",
+    ];
+    let shares = [
+        "accuracy_low",
+        "accuracy_high",
+        "balanced_accuracy",
+        "larger_group",
+        "mlp",
+        "cnn",
+    ];
     let papers = ["paper_accuracy", "paper_mlp", "paper_cnn"];
     let fields = rows.iter().map(|row| {
-        let [low, high] = row.interval.map_or([None, None], |interval| interval.map(Some));
+        let [low, high] = row
+            .interval
+            .map_or([None, None], |interval| interval.map(Some));
         let size = |size: Option<Crossing>| match size {
             Some(Crossing::At(size)) => size.to_string(),
             Some(below) => below.to_string(),
             None => String::new(),
         };
         let about = (&row.task, row.robots, row.physical, row.audited);
-        let shares = (row.accuracy, row.deviation, low, high, row.balanced_accuracy, row.larger_group);
+        let shares = (
+            row.accuracy,
+            row.deviation,
+            low,
+            high,
+            row.balanced_accuracy,
+            row.larger_group,
+        );
         let papers = (row.paper_accuracy, row.paper_mlp, row.paper_cnn);
         (about, shares, [row.mlp, row.cnn].map(size), papers)
     });
-    write_file(&csv, &table::csv(about.into_iter().chain(shares).chain(papers), fields))?;
+    write_file(
+        &csv,
+        &table::csv(about.into_iter().chain(shares).chain(papers), fields),
+    )?;
     Ok(vec![json, csv])
 }
 

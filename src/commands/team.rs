@@ -69,7 +69,9 @@ pub(crate) struct TeamOutcome {
 /// Returns an error if robots do not fit the classes, or archive, data or selection is wrong.
 pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutcome, Error> {
     let archives = options.archives.iter();
-    let sources = archives.map(|path| StoredRun::read(path)).collect::<Result<Vec<StoredRun>, Error>>()?;
+    let sources = archives
+        .map(|path| StoredRun::read(path))
+        .collect::<Result<Vec<StoredRun>, Error>>()?;
     let Some(first) = sources.first() else {
         let text = "expected the runs whose robots are the team";
         return Err(Error::input(text.to_string()).about("archive"));
@@ -79,7 +81,11 @@ pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutco
         check_out(&options.out, &source.path, own_name(options.split))?;
         same_data(first, source)?;
     }
-    different(sources.iter().map(|source| (source.path.as_path(), &source.run)))?;
+    different(
+        sources
+            .iter()
+            .map(|source| (source.path.as_path(), &source.run)),
+    )?;
     let robots = chosen(options, &sources)?;
     let mut whereabouts = Whereabouts::given(session.folder());
     for archive in &options.archives {
@@ -88,10 +94,14 @@ pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutco
     let config = &first.run.config;
     let dataset = load_dataset_of(Some(&first.run.dataset), config, &whereabouts, &Split::ALL)?;
     let (size, split) = (dataset.size(Split::Train), options.split.split());
-    let said = sources.iter().find_map(|other| part_of_others(&other.run.config, size, &dataset, split));
+    let said = sources
+        .iter()
+        .find_map(|other| part_of_others(&other.run.config, size, &dataset, split));
     said.iter().for_each(|text| session.observer.warning(text));
     let classes = classes(options, &dataset)?;
-    let splits = robots.iter().map(|chosen| split_of(&sources[chosen.source], chosen));
+    let splits = robots
+        .iter()
+        .map(|chosen| split_of(&sources[chosen.source], chosen));
     let splits = splits.collect::<Result<Vec<grouping::ClassSplit>, Error>>()?;
     covered(&robots, &splits, &classes)?;
     let images = match options.split {
@@ -104,7 +114,9 @@ pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutco
         program_version: env!("CARGO_PKG_VERSION").to_string(),
         classes,
         dataset: dataset.name().to_string(),
-        test_sha256: dataset.fingerprint(Split::Test).expect("both splits are loaded"),
+        test_sha256: dataset
+            .fingerprint(Split::Test)
+            .expect("both splits are loaded"),
         split: options.split,
         seed: options.seed,
         threshold: THRESHOLD,
@@ -117,7 +129,10 @@ pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutco
         baselines: None,
     };
     let images = file.images.clone();
-    let hashes: Vec<String> = sources.iter().map(|source| source.run.fingerprint()).collect();
+    let hashes: Vec<String> = sources
+        .iter()
+        .map(|source| source.run.fingerprint())
+        .collect();
     // Known members stay in the file from the beginning, in the team's order.
     let known = known(options, &file)?;
     let mut members: Vec<Option<Member>> = robots
@@ -130,14 +145,23 @@ pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutco
         })
         .collect();
     let before = members.iter().flatten().count();
-    let kept = if before > 0 { format!(" ({before} known from before)") } else { String::new() };
+    let kept = if before > 0 {
+        format!(" ({before} known from before)")
+    } else {
+        String::new()
+    };
     let label = format!(
         "showing {} to {}{kept}:",
         counted(images.len(), "image", "images"),
         counted(robots.len(), "robot", "robots")
     );
     let [total, mut done] = [robots.len(), before].map(|robots| (robots * images.len()) as u64);
-    session.observer.begins(&Work { label, total, known: done, unit: "rollouts" });
+    session.observer.begins(&Work {
+        label,
+        total,
+        known: done,
+        unit: "rollouts",
+    });
     let (pool, mut unwritten) = (session.pool()?, Unwritten::default());
     for (place, (chosen, of_robot)) in robots.iter().zip(&splits).enumerate() {
         if members[place].is_some() {
@@ -149,20 +173,32 @@ pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutco
         let walker = HeldOutRun::new(&run.config, control_steps, done, session)?;
         let Some((displacements, _)) = walker.rollouts(chosen.robot, &stimuli) else {
             file.members = members.into_iter().flatten().collect();
-            return Ok(TeamOutcome { file, unwritten: unwritten.error() });
+            return Ok(TeamOutcome {
+                file,
+                unwritten: unwritten.error(),
+            });
         };
         done += images.len() as u64;
-        let trial =
-            Trial { run, robot: chosen.robot, split: of_robot, images: &images, threshold: THRESHOLD };
+        let trial = Trial {
+            run,
+            robot: chosen.robot,
+            split: of_robot,
+            images: &images,
+            threshold: THRESHOLD,
+        };
         members[place] = Some(Member::new(&trial, &hashes[chosen.source], displacements));
         file.members = members.iter().flatten().cloned().collect();
         unwritten.tried(write(options, &file, session), session)?;
     }
     file.members = members.into_iter().flatten().collect();
-    file.baselines = pool.install(|| baselines(&file, (&sources, &robots, &splits), &dataset, split))?;
+    file.baselines =
+        pool.install(|| baselines(&file, (&sources, &robots, &splits), &dataset, split))?;
     file.answers = Some(file.decided());
     unwritten.tried(write(options, &file, session), session)?;
-    Ok(TeamOutcome { file, unwritten: unwritten.error() })
+    Ok(TeamOutcome {
+        file,
+        unwritten: unwritten.error(),
+    })
 }
 
 /// Checks that two runs have robots of the same data.
@@ -172,7 +208,10 @@ fn same_data(first: &StoredRun, other: &StoredRun) -> Result<(), Error> {
         return Ok(());
     }
     let (path, first) = (other.path.display(), first.path.display());
-    let text = format!("{path}: expected robots of the same data ({}) as in {first}", a.dataset.name);
+    let text = format!(
+        "{path}: expected robots of the same data ({}) as in {first}",
+        a.dataset.name
+    );
     Err(Error::input(text).advice(format!("these are of {}: leave them out", b.dataset.name)))
 }
 
@@ -188,9 +227,14 @@ fn chosen<'a>(options: &TeamOptions, sources: &'a [StoredRun]) -> Result<Vec<Cho
     }
     let mut all = Vec::new();
     for (number, source) in sources.iter().enumerate() {
-        let of_one = options.robots.of(std::slice::from_ref(source), options.seed);
+        let of_one = options
+            .robots
+            .of(std::slice::from_ref(source), options.seed);
         let of_one = of_one.map_err(|error| error.in_place(&source.path.display().to_string()))?;
-        all.extend(of_one.into_iter().map(|chosen| Chosen { source: number, ..chosen }));
+        all.extend(of_one.into_iter().map(|chosen| Chosen {
+            source: number,
+            ..chosen
+        }));
     }
     Ok(all)
 }
@@ -202,14 +246,20 @@ fn classes(options: &TeamOptions, dataset: &Dataset) -> Result<Vec<u8>, Error> {
     classes.sort_unstable();
     classes.dedup();
     if let Some(class) = classes.iter().find(|class| !all.contains(class)) {
-        return Err(Error::usage(format!("{} has no class {class}", dataset.name())).about("classes"));
+        return Err(
+            Error::usage(format!("{} has no class {class}", dataset.name())).about("classes"),
+        );
     }
     if classes.len() < 2 {
         return Err(Error::usage("expected two or more".to_string()).about("classes"));
     }
     if !options.images.has_each(classes.len()) {
         let (asked, least) = (options.images, classes.len());
-        return Err(Error::argument("images", asked, format!("expected {least} or more, one of each class")));
+        return Err(Error::argument(
+            "images",
+            asked,
+            format!("expected {least} or more, one of each class"),
+        ));
     }
     Ok(classes)
 }
@@ -225,29 +275,53 @@ pub(crate) fn own_name(split: HeldOut) -> &'static str {
 /// Returns the two groups that a robot tells apart.
 fn split_of(source: &StoredRun, chosen: &Chosen) -> Result<grouping::ClassSplit, Error> {
     let grouping = source.run.config.grouping()?;
-    let text =
-        || format!("{}: robot {} walks the same way for every class", source.path.display(), chosen.robot.id);
+    let text = || {
+        format!(
+            "{}: robot {} walks the same way for every class",
+            source.path.display(),
+            chosen.robot.id
+        )
+    };
     let of_robot = task_of(&grouping, chosen.robot).cloned();
     of_robot.ok_or_else(|| Error::input(text()).remedy(Remedy::ChooseRobots(None)))
 }
 
 /// Checks that every class has a robot, and every robot only classes of the team.
-fn covered(robots: &[Chosen], splits: &[grouping::ClassSplit], classes: &[u8]) -> Result<(), Error> {
+fn covered(
+    robots: &[Chosen],
+    splits: &[grouping::ClassSplit],
+    classes: &[u8],
+) -> Result<(), Error> {
     let is_unknown = |class: &&u8| splits.iter().all(|split| split.group(**class).is_none());
-    let missing: Vec<String> = classes.iter().filter(is_unknown).map(u8::to_string).collect();
+    let missing: Vec<String> = classes
+        .iter()
+        .filter(is_unknown)
+        .map(u8::to_string)
+        .collect();
     if !missing.is_empty() {
         let text = format!("no robot of the team knows class {}", missing.join(", "));
-        return Err(Error::input(text).remedy(Remedy::AddRuns).remedy(Remedy::NameClasses));
+        return Err(Error::input(text)
+            .remedy(Remedy::AddRuns)
+            .remedy(Remedy::NameClasses));
     }
     let is_foreign = |split: &grouping::ClassSplit| {
-        [Group::A, Group::B].into_iter().flat_map(|g| split.classes(g)).any(|class| !classes.contains(class))
+        [Group::A, Group::B]
+            .into_iter()
+            .flat_map(|g| split.classes(g))
+            .any(|class| !classes.contains(class))
     };
-    match robots.iter().zip(splits).find(|(_, split)| is_foreign(split)) {
+    match robots
+        .iter()
+        .zip(splits)
+        .find(|(_, split)| is_foreign(split))
+    {
         None => Ok(()),
         Some((chosen, split)) => {
             let (id, task) = (&chosen.robot.id, split.name());
             let text = format!("robot {id} tells {task} apart: expected classes of the team only");
-            Err(Error::input(text).advice("leave it out").remedy(Remedy::NameClasses))
+            Err(Error::input(text)
+                .advice("leave it out")
+                .remedy(Remedy::NameClasses))
         }
     }
 }
@@ -261,14 +335,34 @@ fn validation_images(
 ) -> Result<Vec<ImageRef>, Error> {
     let besides = chosen_by(sources, dataset, shown_for_validation)?;
     let runs: Vec<_> = sources.iter().map(|source| &source.run).collect();
-    images_besides(&besides, &runs, classes, dataset, Some("images"), options.images)
+    images_besides(
+        &besides,
+        &runs,
+        classes,
+        dataset,
+        Some("images"),
+        options.images,
+    )
 }
 
 /// Returns true if two tests use the same images in the same way, so that members carry over.
 fn is_same(a: &TeamFile, b: &TeamFile) -> bool {
     let about = |file: &TeamFile| {
-        let TeamFile { program_version, test_sha256, images, cycles, split, .. } = file;
-        (program_version.clone(), test_sha256.clone(), images.clone(), *cycles, *split)
+        let TeamFile {
+            program_version,
+            test_sha256,
+            images,
+            cycles,
+            split,
+            ..
+        } = file;
+        (
+            program_version.clone(),
+            test_sha256.clone(),
+            images.clone(),
+            *cycles,
+            *split,
+        )
     };
     about(a) == about(b)
 }
@@ -298,7 +392,9 @@ fn baselines(
     let Some((place, best_body)) = file.best_body() else {
         return Ok(None);
     };
-    let configs = robots.iter().map(|chosen| &sources[chosen.source].run.config);
+    let configs = robots
+        .iter()
+        .map(|chosen| &sources[chosen.source].run.config);
     let common = Config::together(configs).expect("every class of a team has a robot");
     let classes = &file.classes;
     let shown: BTreeSet<usize> = match split {
@@ -306,12 +402,20 @@ fn baselines(
         Split::Train => file.images.iter().map(|image| image.index).collect(),
     };
     let training_of = |config: &Config, classes: &[u8]| {
-        let indices =
-            |class: u8| dataset.indices_of(Split::Train, class).iter().map(move |index| (*index, class));
-        let besides =
-            classes.iter().flat_map(|class| indices(*class)).filter(|(index, _)| !shown.contains(index));
+        let indices = |class: u8| {
+            dataset
+                .indices_of(Split::Train, class)
+                .iter()
+                .map(move |index| (*index, class))
+        };
+        let besides = classes
+            .iter()
+            .flat_map(|class| indices(*class))
+            .filter(|(index, _)| !shown.contains(index));
         let seen = |(index, class)| Ok((see(config, dataset, Split::Train, index)?, class));
-        besides.map(seen).collect::<Result<Vec<(Grid<f64>, u8)>, Error>>()
+        besides
+            .map(seen)
+            .collect::<Result<Vec<(Grid<f64>, u8)>, Error>>()
     };
     let training = training_of(&common, classes)?;
     let known = labelled(&training);
@@ -319,20 +423,35 @@ fn baselines(
     let labels = || file.images.iter().map(|image| image.label);
     let moments = PixelMoments::new(&known);
     let against_rest = |class: &u8| {
-        let rest: Vec<u8> = classes.iter().copied().filter(|other| other != class).collect();
+        let rest: Vec<u8> = classes
+            .iter()
+            .copied()
+            .filter(|other| other != class)
+            .collect();
         moments.apart(&[*class], &rest)
     };
     let against_rest: Vec<Linear> = classes.iter().map(against_rest).collect();
     let largest = |stimulus: &Grid<f64>| {
-        let values: Vec<f64> = against_rest.iter().map(|linear| linear.value(stimulus)).collect();
+        let values: Vec<f64> = against_rest
+            .iter()
+            .map(|linear| linear.value(stimulus))
+            .collect();
         // Ties go to the first.
-        let best =
-            (1..values.len()).fold(0, |best, next| if values[next] > values[best] { next } else { best });
+        let best = (1..values.len()).fold(0, |best, next| {
+            if values[next] > values[best] {
+                next
+            } else {
+                best
+            }
+        });
         classes[best]
     };
     let pair = |a: u8, b: u8| {
         // A positive value is a walk to the right.
-        let judge = Readout { left: vec![b], right: vec![a] };
+        let judge = Readout {
+            left: vec![b],
+            right: vec![a],
+        };
         let is_pair = |split: &grouping::ClassSplit| {
             let mut told = [Group::A, Group::B].map(|group| split.classes(group).to_vec());
             told.sort();
@@ -343,23 +462,43 @@ fn baselines(
         let seeing = |config: &Config| (config.stimulus, config.body.height, config.body.width);
         if seeing(config) == seeing(&common) {
             let linear = moments.apart(&[a], &[b]);
-            return Ok((judge, stimuli.iter().map(|stimulus| linear.value(stimulus)).collect()));
+            return Ok((
+                judge,
+                stimuli
+                    .iter()
+                    .map(|stimulus| linear.value(stimulus))
+                    .collect(),
+            ));
         }
         let training = training_of(config, &[a, b])?;
         let linear = PixelMoments::new(&labelled(&training)).apart(&[a], &[b]);
         let value = |image: &ImageRef| Ok(linear.value(&see(config, dataset, split, image.index)?));
-        Ok((judge, file.images.iter().map(value).collect::<Result<_, Error>>()?))
+        Ok((
+            judge,
+            file.images
+                .iter()
+                .map(value)
+                .collect::<Result<_, Error>>()?,
+        ))
     };
-    let pairs =
-        classes.iter().enumerate().flat_map(|(number, a)| classes[number + 1..].iter().map(|b| (*a, *b)));
+    let pairs = classes
+        .iter()
+        .enumerate()
+        .flat_map(|(number, a)| classes[number + 1..].iter().map(|b| (*a, *b)));
     // The values of each pair's function, image by image.
-    let pairs: Vec<(Readout, Vec<f64>)> = pairs.map(|(a, b)| pair(a, b)).collect::<Result<_, Error>>()?;
+    let pairs: Vec<(Readout, Vec<f64>)> = pairs
+        .map(|(a, b)| pair(a, b))
+        .collect::<Result<_, Error>>()?;
     let voted = |image: usize| {
-        let walks = pairs.iter().map(|(judge, values)| (judge, Some(values[image])));
+        let walks = pairs
+            .iter()
+            .map(|(judge, values)| (judge, Some(values[image])));
         classes[Ballot::count(classes, walks, 0.0, 1.0).by_votes().0]
     };
-    let nearest: Vec<Option<u8>> =
-        stimuli.par_iter().map(|stimulus| nearest(known.iter().copied(), stimulus)).collect();
+    let nearest: Vec<Option<u8>> = stimuli
+        .par_iter()
+        .map(|stimulus| nearest(known.iter().copied(), stimulus))
+        .collect();
     Ok(Some(TeamBaselines {
         training_images: known.len(),
         linear_one_against_rest: Accuracy::of(stimuli.iter().map(largest).zip(labels())),
@@ -371,5 +510,8 @@ fn baselines(
 }
 
 fn labelled(training: &[(Grid<f64>, u8)]) -> Vec<LabelledPixels<'_>> {
-    training.iter().map(|(stimulus, class)| (stimulus, *class)).collect()
+    training
+        .iter()
+        .map(|(stimulus, class)| (stimulus, *class))
+        .collect()
 }

@@ -79,12 +79,24 @@ pub fn train(options: &TrainOptions, session: &Session) -> Result<TrainOutcome, 
     let whereabouts = Whereabouts::given(session.folder())
         .and_of_resumed(options.if_exists, &options.out.join(RUN_JSON))
         .and_of(&options.archive);
-    let config = config_of(&source.run.config, options.groups.classes(), options.seed, &options.set)?;
+    let config = config_of(
+        &source.run.config,
+        options.groups.classes(),
+        options.seed,
+        &options.set,
+    )?;
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;
     check_groups(&options.groups, &dataset)?;
     whereabouts::say_transposed(&dataset, &config.data, session);
     let of_gaits = &source.run;
-    let config = sized(config, &of_gaits.dataset, &of_gaits.config, &dataset, &options.set, session);
+    let config = sized(
+        config,
+        &of_gaits.dataset,
+        &of_gaits.config,
+        &dataset,
+        &options.set,
+        session,
+    );
     let origin = origin(&source, &config, &dataset)?;
     let config = with_images(config, &origin.trained_on, &dataset, session)?;
     let mut training = TrainingImages::of(&config, &dataset)?;
@@ -96,8 +108,13 @@ pub fn train(options: &TrainOptions, session: &Session) -> Result<TrainOutcome, 
     let measured = measured(&source, &config, &probing, &walkers, session);
     let [log, run] = [TRAINING_JSON, RUN_JSON].map(|name| options.out.join(name));
     if options.if_exists == IfExists::Resume && run.exists() && !log.exists() {
-        let text = format!("{}: the run in this folder is no training", options.out.display());
-        return Err(Error::occupied(text).remedy(Remedy::ChooseOut).remedy(Remedy::Replace));
+        let text = format!(
+            "{}: the run in this folder is no training",
+            options.out.display()
+        );
+        return Err(Error::occupied(text)
+            .remedy(Remedy::ChooseOut)
+            .remedy(Remedy::Replace));
     }
     apart(&options.out, &source.path)?;
     let folder = RunFolder::open(&options.out, options.if_exists, session)?;
@@ -113,14 +130,25 @@ pub fn train(options: &TrainOptions, session: &Session) -> Result<TrainOutcome, 
         folder.path().display(),
         counted(gaits, "gait", "gaits")
     ));
-    let trainer = Trainer { config: &config, dataset: &dataset, training: &training, probing, measured };
+    let trainer = Trainer {
+        config: &config,
+        dataset: &dataset,
+        training: &training,
+        probing,
+        measured,
+    };
     let taught = pool.install(|| trainer.train(&walkers, &mut log, session));
     // Rollouts are saved even after an error.
     log.save()?;
     let (walker, config, taught) = taught?;
     let run = run_file(options, &config, &training, origin, walker, &taught)?;
     let seconds = began.elapsed().as_secs_f64();
-    let totals = Totals { evaluations: 1, simulated: log.simulated as u64, seconds, ..Totals::default() };
+    let totals = Totals {
+        evaluations: 1,
+        simulated: log.simulated as u64,
+        seconds,
+        ..Totals::default()
+    };
     let mut metrics = Metrics::open(folder.path(), 0)?;
     metrics.write(0, &run.stats, &totals)?;
     metrics.flush()?;
@@ -130,15 +158,22 @@ pub fn train(options: &TrainOptions, session: &Session) -> Result<TrainOutcome, 
         0 => Some(Vec::new()),
         _ => validation::at_end(&archive, &dataset, session)?,
     };
-    let size = dataset.size(Split::Train).expect("a training loads its training images");
-    Ok(TrainOutcome { run, rollouts: log.simulated, size, validated })
+    let size = dataset
+        .size(Split::Train)
+        .expect("a training loads its training images");
+    Ok(TrainOutcome {
+        run,
+        rollouts: log.simulated,
+        size,
+        validated,
+    })
 }
 
 /// Checks that the output folder is not that of the gaits, whose run would be overwritten.
 fn apart(out: &Path, archive: &Path) -> Result<(), Error> {
     let of_gaits = archive.parent().map(|folder| Path::new(".").join(folder));
-    let [out_now, of_gaits] =
-        [Some(out), of_gaits.as_deref()].map(|folder| folder.and_then(|folder| folder.canonicalize().ok()));
+    let [out_now, of_gaits] = [Some(out), of_gaits.as_deref()]
+        .map(|folder| folder.and_then(|folder| folder.canonicalize().ok()));
     if out_now.is_some() && out_now == of_gaits {
         let text = "expected another folder: the gaits are in this one";
         return Err(Error::argument("out", out.display(), text));
@@ -156,11 +191,21 @@ fn run_file(
     taught: &TrainedDesign,
 ) -> Result<RunFile, Error> {
     let body = taught.body.clone();
-    let genome = walker.robot.genome.with_body(&body).map_err(|error| Error::other(error.to_string()))?;
-    let training_images: Vec<ImageRef> = taught.shown.iter().map(|image| training.images[*image]).collect();
+    let genome = walker
+        .robot
+        .genome
+        .with_body(&body)
+        .map_err(|error| Error::other(error.to_string()))?;
+    let training_images: Vec<ImageRef> = taught
+        .shown
+        .iter()
+        .map(|image| training.images[*image])
+        .collect();
     let grouping = config.grouping()?.with_fitness(config.evaluation.fitness);
-    let answers =
-        crate::store::images::answers(&training_images, taught.displacements.iter().copied().map(Some));
+    let answers = crate::store::images::answers(
+        &training_images,
+        taught.displacements.iter().copied().map(Some),
+    );
     let score = grouping.score(&answers);
     let mut robot = Robot {
         id: genome.id(),
@@ -176,10 +221,21 @@ fn run_file(
     };
     robot.cell = robot.bins();
     let space = DescriptorSpace::voxel_counts(grouping.tasks().len());
-    let cell = space.index(&robot.cell).expect("bins of voxel counts are a cell of one task's archive");
+    let cell = space
+        .index(&robot.cell)
+        .expect("bins of voxel counts are a cell of one task's archive");
     let mut archive = Archive::new();
-    let elite = Elite { cell, objective: robot.objective, solution: robot };
-    archive.insert(elite).map_err(|error| Error::other(error.to_string()))?;
+    let elite = Elite {
+        cell,
+        objective: robot.objective,
+        solution: robot,
+    };
+    archive
+        .insert(elite)
+        .map_err(|error| Error::other(error.to_string()))?;
     let data = (&training.dataset, training_images);
-    Ok(RunFile { origin: Some(origin), ..RunFile::new(&options.name, config, data, 1, &archive)? })
+    Ok(RunFile {
+        origin: Some(origin),
+        ..RunFile::new(&options.name, config, data, 1, &archive)?
+    })
 }

@@ -55,18 +55,40 @@ impl Criteria {
 
     /// Checks what types cannot.
     pub(crate) fn check(&self) -> Result<(), Error> {
-        let Sizes { start, time_step, share, pixels, least_sensors: _, seed } = &self.perturbations;
-        let shares = [self.least_answered, self.least_kept, self.least_distance, self.least_robust];
-        let refuse =
-            |key: &str, text: &str| Err(Error::input(format!("audit criteria: {text}")).with_key(key));
-        if ![self.threshold, self.least_walk].iter().all(|walk| (0.0..1e9).contains(walk)) {
-            return refuse("threshold", "threshold, least_walk: expected 0 or more voxel lengths");
+        let Sizes {
+            start,
+            time_step,
+            share,
+            pixels,
+            least_sensors: _,
+            seed,
+        } = &self.perturbations;
+        let shares = [
+            self.least_answered,
+            self.least_kept,
+            self.least_distance,
+            self.least_robust,
+        ];
+        let refuse = |key: &str, text: &str| {
+            Err(Error::input(format!("audit criteria: {text}")).with_key(key))
+        };
+        if ![self.threshold, self.least_walk]
+            .iter()
+            .all(|walk| (0.0..1e9).contains(walk))
+        {
+            return refuse(
+                "threshold",
+                "threshold, least_walk: expected 0 or more voxel lengths",
+            );
         }
         if !shares.iter().all(|share| (0.0..=1.0).contains(share)) {
             return refuse("least_kept", "least_…: expected shares from 0 to 1");
         }
         if start.iter().any(|&rows| rows == 0 || rows > 100) {
-            return refuse("perturbations.start", "perturbations.start: expected 1 to 100 rows");
+            return refuse(
+                "perturbations.start",
+                "perturbations.start: expected 1 to 100 rows",
+            );
         }
         if time_step.iter().any(|&by| !(2..=64).contains(&by)) {
             return refuse(

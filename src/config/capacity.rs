@@ -50,7 +50,10 @@ impl Default for CapacityConfig {
             waiting_images: 400,
             seed: 1,
             mlp: Hyperparameters::default(),
-            cnn: Hyperparameters { pooling: Pooling::Max2, ..Hyperparameters::default() },
+            cnn: Hyperparameters {
+                pooling: Pooling::Max2,
+                ..Hyperparameters::default()
+            },
         }
     }
 }
@@ -66,23 +69,31 @@ impl CapacityConfig {
 
     /// Checks what types cannot.
     pub(crate) fn check(&self) -> Result<(), Error> {
-        let refuse = |key: &str, text: &str| Err(Error::input(format!("capacity: {text}")).with_key(key));
+        let refuse =
+            |key: &str, text: &str| Err(Error::input(format!("capacity: {text}")).with_key(key));
         let [from, to] = self.sizes;
         if from == 0 || to < from || to > MOST {
             return refuse(
                 "sizes",
-                &format!("sizes = [{from}, {to}]: expected two sizes from 1 to {MOST}, the smaller first"),
+                &format!(
+                    "sizes = [{from}, {to}]: expected two sizes from 1 to {MOST}, the smaller first"
+                ),
             );
         }
         if !(1..=MOST_TRAININGS).contains(&self.trainings) {
             return refuse(
                 "trainings",
-                &format!("trainings = {}: expected 1 to {MOST_TRAININGS}", self.trainings),
+                &format!(
+                    "trainings = {}: expected 1 to {MOST_TRAININGS}",
+                    self.trainings
+                ),
             );
         }
-        for (key, count) in
-            [("step", self.step), ("networks", self.networks.len()), ("waiting_images", self.waiting_images)]
-        {
+        for (key, count) in [
+            ("step", self.step),
+            ("networks", self.networks.len()),
+            ("waiting_images", self.waiting_images),
+        ] {
             if count == 0 {
                 return refuse(key, &format!("{key}: expected one or more"));
             }
@@ -96,7 +107,10 @@ impl CapacityConfig {
                 );
             }
             if hyper.epochs == 0 || hyper.patience == 0 || hyper.kernel == 0 {
-                return refuse(name, &format!("{name}: epochs, patience, kernel: expected 1 or more"));
+                return refuse(
+                    name,
+                    &format!("{name}: epochs, patience, kernel: expected 1 or more"),
+                );
             }
         }
         Ok(())

@@ -22,7 +22,11 @@ pub(super) struct Mismatch {
 impl Mismatch {
     /// Formats the message with its key.
     pub(crate) fn at(&self, key: &str) -> String {
-        let Mismatch { scalar, found, expected } = self;
+        let Mismatch {
+            scalar,
+            found,
+            expected,
+        } = self;
         match scalar {
             Some(scalar) if !key.is_empty() => format!("{key} = {scalar}: expected {expected}"),
             _ if key.is_empty() => format!("expected {expected}, found {found}"),
@@ -48,7 +52,11 @@ pub(super) fn mismatch<T: JsonSchema>(settings: &Value, path: &Path) -> Option<M
         .map(|kinds| kinds.concat())
         .filter(|kinds| !kinds.is_empty() && !kinds.iter().any(|kind| kind.has(value)))?;
     let mut expected = Vec::new();
-    for words in kinds.iter().filter(|kind| !matches!(kind, Kind::Null)).map(Kind::words) {
+    for words in kinds
+        .iter()
+        .filter(|kind| !matches!(kind, Kind::Null))
+        .map(Kind::words)
+    {
         if !expected.contains(&words) {
             expected.push(words);
         }
@@ -60,9 +68,16 @@ pub(super) fn mismatch<T: JsonSchema>(settings: &Value, path: &Path) -> Option<M
         Value::Object(_) => (None, "a table".to_string()),
         // Numbers that JSON lacks, such as TOML's inf.
         Value::Null => return None,
-        scalar => (Some(one_line(&scalar.to_string())), one_line(&scalar.to_string())),
+        scalar => (
+            Some(one_line(&scalar.to_string())),
+            one_line(&scalar.to_string()),
+        ),
     };
-    Some(Mismatch { scalar, found, expected: format!("{}{meant}", expected.join(", or ")) })
+    Some(Mismatch {
+        scalar,
+        found,
+        expected: format!("{}{meant}", expected.join(", or ")),
+    })
 }
 
 /// Returns the unknown part of a key, if any, with the keys of its table.
@@ -75,9 +90,12 @@ pub(super) fn unknown_part<T: JsonSchema>(key: &str) -> Option<(String, Vec<Stri
             Err(_) => schema.of_key(&schemas, part),
         };
         if inner.is_empty() {
-            let is_closed = |schema: &&Value| schema.get("additionalProperties") == Some(&Value::Bool(false));
+            let is_closed =
+                |schema: &&Value| schema.get("additionalProperties") == Some(&Value::Bool(false));
             let closed: Vec<&Value> = schemas.iter().copied().filter(is_closed).collect();
-            let keys = closed.iter().filter_map(|schema| schema.get("properties")?.as_object());
+            let keys = closed
+                .iter()
+                .filter_map(|schema| schema.get("properties")?.as_object());
             let keys = keys.flat_map(|keys| keys.keys().cloned()).collect();
             return (!closed.is_empty()).then(|| (part.to_string(), keys));
         }
@@ -93,28 +111,47 @@ struct Schema {
 impl Schema {
     fn of<T: JsonSchema>() -> Self {
         let generator = SchemaSettings::draft2020_12().into_generator();
-        Schema { root: generator.into_root_schema_for::<T>().to_value() }
+        Schema {
+            root: generator.into_root_schema_for::<T>().to_value(),
+        }
     }
 
     /// Returns the alternatives of a value's schema.
     fn alternatives<'a>(&'a self, schema: &'a Value) -> Vec<&'a Value> {
         if let Some(name) = schema.get("$ref").and_then(Value::as_str) {
-            let of_name = name.strip_prefix('#').and_then(|pointer| self.root.pointer(pointer));
+            let of_name = name
+                .strip_prefix('#')
+                .and_then(|pointer| self.root.pointer(pointer));
             return of_name.map_or(Vec::new(), |schema| self.alternatives(schema));
         }
-        let several = ["anyOf", "oneOf"].iter().find_map(|one| schema.get(one)?.as_array());
+        let several = ["anyOf", "oneOf"]
+            .iter()
+            .find_map(|one| schema.get(one)?.as_array());
         match several {
-            Some(several) => several.iter().flat_map(|schema| self.alternatives(schema)).collect(),
+            Some(several) => several
+                .iter()
+                .flat_map(|schema| self.alternatives(schema))
+                .collect(),
             None => vec![schema],
         }
     }
 
     fn of_key<'a>(&'a self, schemas: &[&'a Value], key: &str) -> Vec<&'a Value> {
         let inner = |schema: &&'a Value| {
-            let of_key = schema.get("properties").and_then(|properties| properties.get(key));
-            of_key.or_else(|| schema.get("additionalProperties").filter(|other| other.is_object()))
+            let of_key = schema
+                .get("properties")
+                .and_then(|properties| properties.get(key));
+            of_key.or_else(|| {
+                schema
+                    .get("additionalProperties")
+                    .filter(|other| other.is_object())
+            })
         };
-        schemas.iter().filter_map(inner).flat_map(|schema| self.alternatives(schema)).collect()
+        schemas
+            .iter()
+            .filter_map(inner)
+            .flat_map(|schema| self.alternatives(schema))
+            .collect()
     }
 
     fn of_index<'a>(&'a self, schemas: &[&'a Value], index: usize) -> Vec<&'a Value> {
@@ -122,7 +159,11 @@ impl Schema {
             let of_index = schema.get("prefixItems").and_then(|items| items.get(index));
             of_index.or_else(|| schema.get("items").filter(|items| items.is_object()))
         };
-        schemas.iter().filter_map(inner).flat_map(|schema| self.alternatives(schema)).collect()
+        schemas
+            .iter()
+            .filter_map(inner)
+            .flat_map(|schema| self.alternatives(schema))
+            .collect()
     }
 }
 
@@ -142,7 +183,10 @@ impl Kind {
     /// Returns the kinds of a schema without alternatives, or `None` if it names none.
     fn all_of(schema: &Value) -> Option<Vec<Self>> {
         match schema.get("type")? {
-            Value::Array(names) => names.iter().map(|name| Kind::of(name.as_str()?, schema)).collect(),
+            Value::Array(names) => names
+                .iter()
+                .map(|name| Kind::of(name.as_str()?, schema))
+                .collect(),
             name => Some(vec![Kind::of(name.as_str()?, schema)?]),
         }
     }
@@ -174,7 +218,10 @@ impl Kind {
             Kind::Null => value.is_null(),
             Kind::Boolean => value.is_boolean(),
             Kind::Integer(least, largest) => {
-                let number = value.as_i64().map(i128::from).or(value.as_u64().map(i128::from));
+                let number = value
+                    .as_i64()
+                    .map(i128::from)
+                    .or(value.as_u64().map(i128::from));
                 number.is_some_and(|number| {
                     least.is_none_or(|least| number >= least)
                         && largest.is_none_or(|largest| number <= largest)
@@ -205,7 +252,11 @@ impl Kind {
 
     /// Returns the number meant by a text that is no TOML number, such as `.5`, `5.` or `05`.
     fn meant(&self, value: &Value) -> Option<String> {
-        let number = value.as_str()?.parse::<f64>().ok().filter(|number| number.is_finite())?;
+        let number = value
+            .as_str()?
+            .parse::<f64>()
+            .ok()
+            .filter(|number| number.is_finite())?;
         match self {
             Kind::Number => Some(format!("{number:?}")),
             Kind::Integer(..) if number.fract() == 0.0 && number.abs() < 1e15 => {

@@ -40,11 +40,23 @@ use std::path::{Path, PathBuf};
 
 /// The configs that are part of the program: name and text.
 pub const BUILT_IN: [(&str, &str); 6] = [
-    ("quickstart.toml", include_str!("../../configs/quickstart.toml")),
+    (
+        "quickstart.toml",
+        include_str!("../../configs/quickstart.toml"),
+    ),
     ("zero_one.toml", include_str!("../../configs/zero_one.toml")),
-    ("zero_one_published.toml", include_str!("../../configs/zero_one_published.toml")),
-    ("four_digit.toml", include_str!("../../configs/four_digit.toml")),
-    ("four_digit_published.toml", include_str!("../../configs/four_digit_published.toml")),
+    (
+        "zero_one_published.toml",
+        include_str!("../../configs/zero_one_published.toml"),
+    ),
+    (
+        "four_digit.toml",
+        include_str!("../../configs/four_digit.toml"),
+    ),
+    (
+        "four_digit_published.toml",
+        include_str!("../../configs/four_digit_published.toml"),
+    ),
     ("gaits.toml", include_str!("../../configs/gaits.toml")),
 ];
 
@@ -111,8 +123,11 @@ pub(crate) type Settings = BTreeMap<String, toml::Value>;
 
 /// Returns the keys in which two settings differ, with both values as text, in the keys' order.
 pub(crate) fn differing(there: &Settings, now: &Settings) -> Vec<(String, String, String)> {
-    let value =
-        |settings: &Settings, key: &str| settings.get(key).map_or("not set".to_string(), ToString::to_string);
+    let value = |settings: &Settings, key: &str| {
+        settings
+            .get(key)
+            .map_or("not set".to_string(), ToString::to_string)
+    };
     let keys: BTreeSet<&String> = there.keys().chain(now.keys()).collect();
     let differs = |key: &&String| there.get(*key) != now.get(*key);
     let with_values = |key: &String| (key.clone(), value(there, key), value(now, key));
@@ -124,9 +139,15 @@ pub(crate) fn flatten(name: &str, value: toml::Value, settings: &mut Settings) {
     match value {
         toml::Value::Table(table) => {
             let below = |key: String| {
-                if name.is_empty() { key } else { format!("{name}.{key}") }
+                if name.is_empty() {
+                    key
+                } else {
+                    format!("{name}.{key}")
+                }
             };
-            table.into_iter().for_each(|(key, value)| flatten(&below(key), value, settings));
+            table
+                .into_iter()
+                .for_each(|(key, value)| flatten(&below(key), value, settings));
         }
         value => {
             settings.insert(name.to_string(), value);
@@ -156,7 +177,11 @@ pub struct BodyConfig {
 
 impl Default for BodyConfig {
     fn default() -> Self {
-        BodyConfig { height: 14, width: 14, min_muscles: 3 }
+        BodyConfig {
+            height: 14,
+            width: 14,
+            min_muscles: 3,
+        }
     }
 }
 
@@ -233,7 +258,10 @@ pub struct CheckpointConfig {
 
 impl Default for CheckpointConfig {
     fn default() -> Self {
-        CheckpointConfig { generations: 1000, seconds: 10.0 }
+        CheckpointConfig {
+            generations: 1000,
+            seconds: 10.0,
+        }
     }
 }
 
@@ -245,10 +273,13 @@ fn too_large(place: &str, value: &serde_json::Value) -> Option<(String, u64)> {
         section => format!("{section}.{key}"),
     };
     match value {
-        Number(number) => {
-            number.as_u64().filter(|&number| number > MAX_NUMBER).map(|number| (place.to_string(), number))
-        }
-        Object(keys) => keys.iter().find_map(|(key, value)| too_large(&below(key), value)),
+        Number(number) => number
+            .as_u64()
+            .filter(|&number| number > MAX_NUMBER)
+            .map(|number| (place.to_string(), number)),
+        Object(keys) => keys
+            .iter()
+            .find_map(|(key, value)| too_large(&below(key), value)),
         Array(values) => values.iter().find_map(|value| too_large(place, value)),
         _ => None,
     }
@@ -269,9 +300,16 @@ impl Config {
     ///
     /// # Errors
     /// Returns the errors of [`Config::load`].
-    pub(crate) fn load_from(folder: &Path, name: &str, overrides: &[String]) -> Result<Self, Error> {
-        let built_in =
-            || BUILT_IN.iter().find(|(own, _)| *own == name || own.strip_suffix(".toml") == Some(name));
+    pub(crate) fn load_from(
+        folder: &Path,
+        name: &str,
+        overrides: &[String],
+    ) -> Result<Self, Error> {
+        let built_in = || {
+            BUILT_IN
+                .iter()
+                .find(|(own, _)| *own == name || own.strip_suffix(".toml") == Some(name))
+        };
         let path = folder.join(home_expanded(Path::new(name)));
         // A folder may have the name of a built-in config.
         let is_no_file = |error: &std::io::Error| match error.kind() {
@@ -307,7 +345,11 @@ impl Config {
             let is_lacking = error.message.contains("missing field");
             let config = Invocation::new("config").value("zero_one.toml");
             let remedy = Remedy::Run(config, "prints a whole one to start your own from");
-            if is_lacking { error.remedy(remedy) } else { error }
+            if is_lacking {
+                error.remedy(remedy)
+            } else {
+                error
+            }
         })?;
         reading::changed(config, overrides, Config::validate, |error| {
             reading::placed(error, text, format, name)
@@ -316,7 +358,8 @@ impl Config {
 
     /// Returns the config as TOML, every key with its value.
     pub fn to_toml(&self) -> String {
-        toml::to_string_pretty(self).expect("every field is a number, text, list or table, which TOML has")
+        toml::to_string_pretty(self)
+            .expect("every field is a number, text, list or table, which TOML has")
     }
 
     /// Returns the settings that a generation's results depend on: without the number of
@@ -327,7 +370,10 @@ impl Config {
             savings: Savings::default(),
             validation: ValidationConfig::default(),
             checkpoint: CheckpointConfig::default(),
-            data: DataConfig { dir: None, ..self.data.clone() },
+            data: DataConfig {
+                dir: None,
+                ..self.data.clone()
+            },
             ..self.clone()
         }
     }
@@ -347,14 +393,26 @@ impl Config {
     /// Returns the common config of several robots: the first one's, with the
     /// [`StimulusParams::together`] of all, or `None` without a config.
     pub(crate) fn together<'a>(all: impl IntoIterator<Item = &'a Config> + Clone) -> Option<Self> {
-        let stimulus = StimulusParams::together(all.clone().into_iter().map(|config| config.stimulus))?;
-        all.into_iter().next().map(|first| Config { stimulus, ..first.clone() })
+        let stimulus =
+            StimulusParams::together(all.clone().into_iter().map(|config| config.stimulus))?;
+        all.into_iter().next().map(|first| Config {
+            stimulus,
+            ..first.clone()
+        })
     }
 
     /// Returns the specification of the bodies that evolve.
     pub fn body_spec(&self) -> BodySpec {
-        let BodyConfig { height, width, min_muscles } = self.body;
-        BodySpec { height, width, min_muscles }
+        let BodyConfig {
+            height,
+            width,
+            min_muscles,
+        } = self.body;
+        BodySpec {
+            height,
+            width,
+            min_muscles,
+        }
     }
 
     /// Returns the tasks.
@@ -372,22 +430,40 @@ impl Config {
 
     /// Checks what types cannot.
     pub(crate) fn validate(&self) -> Result<(), Error> {
-        let refuse = |key: &str, found: String, expected: &str| Err(Error::value(key, found, expected));
-        let numbers = serde_json::to_value(self).map_err(|error| Error::input(error.to_string()))?;
+        let refuse =
+            |key: &str, found: String, expected: &str| Err(Error::value(key, found, expected));
+        let numbers =
+            serde_json::to_value(self).map_err(|error| Error::input(error.to_string()))?;
         if let Some((key, number)) = too_large("", &numbers) {
             return refuse(&key, number.to_string(), &format!("0 to {MAX_NUMBER}"));
         }
         self.grouping()?;
-        self.physics
+        self.physics.validate().map_err(|error| {
+            Error::value(
+                &format!("physics.{}", error.name),
+                error.value,
+                error.expected,
+            )
+        })?;
+        self.stimulus
             .validate()
-            .map_err(|error| Error::value(&format!("physics.{}", error.name), error.value, error.expected))?;
-        self.stimulus.validate().map_err(|error| Error::at_key("stimulus", error))?;
+            .map_err(|error| Error::at_key("stimulus", error))?;
         check_name(&self.data.dataset).map_err(|error| Error::at_key("data.dataset", error))?;
         if self.data.dataset == BUILTIN && self.data.transpose == Some(true) {
-            return refuse("data.transpose", true.to_string(), "false: the built-in digits stand upright");
+            return refuse(
+                "data.transpose",
+                true.to_string(),
+                "false: the built-in digits stand upright",
+            );
         }
-        self.data.builtin.check().map_err(|error| Error::at_key("data.builtin", error))?;
-        for (key, side) in [("body.height", self.body.height), ("body.width", self.body.width)] {
+        self.data
+            .builtin
+            .check()
+            .map_err(|error| Error::at_key("data.builtin", error))?;
+        for (key, side) in [
+            ("body.height", self.body.height),
+            ("body.width", self.body.width),
+        ] {
             if side == 0 || side > MAX_SIDE {
                 return refuse(key, side.to_string(), &format!("1 to {MAX_SIDE}"));
             }
@@ -407,7 +483,11 @@ impl Config {
         self.validate_response()?;
         if self.validation.images < LEAST {
             let expected = format!("{} or more", LEAST);
-            return refuse("validation.images", self.validation.images.to_string(), &expected);
+            return refuse(
+                "validation.images",
+                self.validation.images.to_string(),
+                &expected,
+            );
         }
         if self.generations == 0 {
             return refuse("generations", self.generations.to_string(), "1 or more");
@@ -421,20 +501,36 @@ impl Config {
         }
         if !(1..=MAX_STEPS).contains(&self.protocol.control_steps) {
             let expected = format!("1 to {MAX_STEPS}");
-            return refuse("protocol.control_steps", self.protocol.control_steps.to_string(), &expected);
+            return refuse(
+                "protocol.control_steps",
+                self.protocol.control_steps.to_string(),
+                &expected,
+            );
         }
         if !(self.physics.ground_row..=MAX_ROW).contains(&self.protocol.start_row) {
             let expected = format!("{} (on the ground) to {MAX_ROW}", self.physics.ground_row);
-            return refuse("protocol.start_row", self.protocol.start_row.to_string(), &expected);
+            return refuse(
+                "protocol.start_row",
+                self.protocol.start_row.to_string(),
+                &expected,
+            );
         }
         if !(-MAX_COLUMN..=MAX_COLUMN).contains(&self.protocol.start_column) {
             let expected = format!("−{MAX_COLUMN} to {MAX_COLUMN}");
-            return refuse("protocol.start_column", self.protocol.start_column.to_string(), &expected);
+            return refuse(
+                "protocol.start_column",
+                self.protocol.start_column.to_string(),
+                &expected,
+            );
         }
         // Sums over an archive must stay finite, because files cannot hold other values.
         if self.archive.qd_offset.is_nan() || self.archive.qd_offset.abs() > MAX_OFFSET {
             let expected = format!("a number from −{MAX_OFFSET} to {MAX_OFFSET}");
-            return refuse("archive.qd_offset", self.archive.qd_offset.to_string(), &expected);
+            return refuse(
+                "archive.qd_offset",
+                self.archive.qd_offset.to_string(),
+                &expected,
+            );
         }
         if self.archive.keep == Some(0) {
             return refuse("archive.keep", "0".to_string(), "1 or more");
@@ -449,8 +545,14 @@ impl Config {
                 "a finite number, 0 or above",
             );
         }
-        if self.data.images_per_class == 0 || self.data.train_images.as_ref().is_some_and(Vec::is_empty) {
-            return refuse("data", "no images".to_string(), "at least one training image of each class");
+        if self.data.images_per_class == 0
+            || self.data.train_images.as_ref().is_some_and(Vec::is_empty)
+        {
+            return refuse(
+                "data",
+                "no images".to_string(),
+                "at least one training image of each class",
+            );
         }
         Ok(())
     }
@@ -478,8 +580,16 @@ impl Config {
         let (tasks, classes) = (self.grouping()?.tasks().len(), self.classes().len());
         let per_class = self.data.images_per_class;
         let (images_key, found, images) = match &self.data.train_images {
-            Some(named) => ("data.train_images", format!("{} images", named.len()), named.len()),
-            None => ("data.images_per_class", per_class.to_string(), per_class.saturating_mul(classes)),
+            Some(named) => (
+                "data.train_images",
+                format!("{} images", named.len()),
+                named.len(),
+            ),
+            None => (
+                "data.images_per_class",
+                per_class.to_string(),
+                per_class.saturating_mul(classes),
+            ),
         };
         let enough = format!("an even number of training images in all, {LEAST_IMAGES} or more");
         let checks = [
@@ -501,12 +611,18 @@ impl Config {
                 self.validation.best.to_string(),
                 "0: gaits tell no images apart yet",
             ),
-            (images < LEAST_IMAGES || images % 2 == 1, images_key, found, enough.as_str()),
+            (
+                images < LEAST_IMAGES || images % 2 == 1,
+                images_key,
+                found,
+                enough.as_str(),
+            ),
         ];
         match checks.into_iter().find(|(is_wrong, ..)| *is_wrong) {
             Some((_, key, found, expected)) => {
-                let text =
-                    format!("{key} = {found}: with evaluation.fitness = \"response\" expected {expected}");
+                let text = format!(
+                    "{key} = {found}: with evaluation.fitness = \"response\" expected {expected}"
+                );
                 Err(Error::input(text).with_key(key))
             }
             None => Ok(()),

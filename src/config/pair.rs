@@ -7,10 +7,14 @@ use serde::de::{Deserialize, Deserializer, Error};
 ///
 /// # Errors
 /// Returns an error if the list has another length, or an item is invalid.
-pub(crate) fn read<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<[T; 2], D::Error> {
+pub(crate) fn read<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
+    from: D,
+) -> Result<[T; 2], D::Error> {
     let items = Vec::<T>::deserialize(from)?;
     let count = items.len();
-    items.try_into().map_err(|_| D::Error::custom(format!("expected a list of two, found {count}")))
+    items
+        .try_into()
+        .map_err(|_| D::Error::custom(format!("expected a list of two, found {count}")))
 }
 
 /// Reads an optional pair.

@@ -88,19 +88,31 @@ impl TrainConfig {
             ("final_images", self.final_images, 2),
         ];
         match least.into_iter().find(|(_, value, least)| value < least) {
-            Some((key, value, least)) => {
-                Err(Error::value(&format!("train.{key}"), value, &format!("{least} or more")))
-            }
+            Some((key, value, least)) => Err(Error::value(
+                &format!("train.{key}"),
+                value,
+                &format!("{least} or more"),
+            )),
             None if self.random_images > MOST_RANDOM_IMAGES => {
                 let expected = format!("at most {MOST_RANDOM_IMAGES}");
-                Err(Error::value("train.random_images", self.random_images, &expected))
+                Err(Error::value(
+                    "train.random_images",
+                    self.random_images,
+                    &expected,
+                ))
             }
-            None if self.windows > MOST_WINDOWS => {
-                Err(Error::value("train.windows", self.windows, &format!("at most {MOST_WINDOWS}")))
-            }
+            None if self.windows > MOST_WINDOWS => Err(Error::value(
+                "train.windows",
+                self.windows,
+                &format!("at most {MOST_WINDOWS}"),
+            )),
             None if self.perturbations.start > MOST_ROWS => {
                 let expected = format!("at most {MOST_ROWS} rows");
-                Err(Error::value("train.perturbations.start", self.perturbations.start, &expected))
+                Err(Error::value(
+                    "train.perturbations.start",
+                    self.perturbations.start,
+                    &expected,
+                ))
             }
             None => Ok(()),
         }

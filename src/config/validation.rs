@@ -21,7 +21,10 @@ pub struct ValidationConfig {
 
 impl Default for ValidationConfig {
     fn default() -> Self {
-        ValidationConfig { images: 400, best: 0 }
+        ValidationConfig {
+            images: 400,
+            best: 0,
+        }
     }
 }
 

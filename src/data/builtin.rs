@@ -30,7 +30,12 @@ pub(crate) struct BuiltinDigits {
 impl Default for BuiltinDigits {
     /// Seed 1, all ten digits, 1000 training and 500 test images of each.
     fn default() -> Self {
-        BuiltinDigits { seed: 1, classes: (0..10).collect(), train_per_class: 1000, test_per_class: 500 }
+        BuiltinDigits {
+            seed: 1,
+            classes: (0..10).collect(),
+            train_per_class: 1000,
+            test_per_class: 500,
+        }
     }
 }
 
@@ -96,15 +101,19 @@ impl BuiltinDigits {
         let class = self.label(split, index)?;
         let number = (index / self.classes.len()) as u64;
         let page = 16 * split.code() + u64::from(class);
-        Some(pen::write(class, &mut stream(self.seed, Purpose::BuiltinDigits, page, number)))
+        Some(pen::write(
+            class,
+            &mut stream(self.seed, Purpose::BuiltinDigits, page, number),
+        ))
     }
 
     /// Returns the SHA-256 of a split's parameters: drawing version, seed, classes and number.
     pub(crate) fn fingerprint(&self, split: Split) -> String {
         let (seed, classes, number) = (self.seed, &self.classes, self.per_class(split));
         let drawing = pen::DRAWING;
-        let text =
-            format!("builtin digits {drawing}; seed {seed}; {split}; classes {classes:?}; {number} each");
+        let text = format!(
+            "builtin digits {drawing}; seed {seed}; {split}; classes {classes:?}; {number} each"
+        );
         sha256_hex(text.as_bytes())
     }
 
@@ -132,18 +141,28 @@ mod tests {
         }
         assert_eq!((pen::DRAWING, sha256_hex(&bytes).as_str()), PINNED);
     }
-    const PINNED: (u32, &str) = (1, "9e204edcd4dee8a6e32ae34660207b1e7358d1ec1283a3cd5ccd3320089d76e1");
+    const PINNED: (u32, &str) = (
+        1,
+        "9e204edcd4dee8a6e32ae34660207b1e7358d1ec1283a3cd5ccd3320089d76e1",
+    );
 
     #[test]
     fn an_image_depends_on_seed_split_class_and_number_only() {
         let ten = BuiltinDigits::default();
-        let two = BuiltinDigits { classes: vec![7, 3], test_per_class: 9, ..ten.clone() };
+        let two = BuiltinDigits {
+            classes: vec![7, 3],
+            test_per_class: 9,
+            ..ten.clone()
+        };
         // The fifth three: number 4.
         assert_eq!(ten.image(Split::Train, 43), two.image(Split::Train, 9));
         assert_eq!(two.label(Split::Test, 9), Some(3));
         assert_ne!(ten.image(Split::Train, 43), ten.image(Split::Test, 43));
         assert_ne!(ten.image(Split::Train, 43), ten.image(Split::Train, 53));
-        let other = BuiltinDigits { seed: 2, ..ten.clone() };
+        let other = BuiltinDigits {
+            seed: 2,
+            ..ten.clone()
+        };
         assert_ne!(ten.image(Split::Train, 43), other.image(Split::Train, 43));
         assert_eq!(two.image(Split::Test, 18), None);
     }
@@ -151,9 +170,14 @@ mod tests {
     #[test]
     fn classes_take_turns() {
         let digits = BuiltinDigits::default();
-        let first: Vec<u8> = (0..12).filter_map(|i| digits.label(Split::Test, i)).collect();
+        let first: Vec<u8> = (0..12)
+            .filter_map(|i| digits.label(Split::Test, i))
+            .collect();
         assert_eq!(first, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 0, 1]);
-        assert_eq!((digits.len(Split::Train), digits.len(Split::Test)), (10_000, 5000));
+        assert_eq!(
+            (digits.len(Split::Train), digits.len(Split::Test)),
+            (10_000, 5000)
+        );
     }
 
     #[test]
@@ -168,17 +192,29 @@ mod tests {
             );
             let inked = image.cells().iter().filter(|&&v| v > 0).count();
             assert!((30..330).contains(&inked), "{index}: {inked} pixels of ink");
-            assert!(image.cells().iter().any(|&v| v > 250), "{index}: no full ink");
-            assert!(image.cells().iter().any(|&v| v > 0 && v < 200), "{index}: no soft edge");
+            assert!(
+                image.cells().iter().any(|&v| v > 250),
+                "{index}: no full ink"
+            );
+            assert!(
+                image.cells().iter().any(|&v| v > 0 && v < 200),
+                "{index}: no soft edge"
+            );
         }
     }
 
     #[test]
     fn impossible_classes_are_refused() {
-        let with = |classes: &[u8]| BuiltinDigits { classes: classes.to_vec(), ..BuiltinDigits::default() };
+        let with = |classes: &[u8]| BuiltinDigits {
+            classes: classes.to_vec(),
+            ..BuiltinDigits::default()
+        };
         assert_eq!(with(&[]).check(), Err(BuiltinError::NoClasses));
         assert_eq!(with(&[3, 10]).check(), Err(BuiltinError::NotADigit(10)));
-        let many = BuiltinDigits { test_per_class: usize::MAX, ..BuiltinDigits::default() };
+        let many = BuiltinDigits {
+            test_per_class: usize::MAX,
+            ..BuiltinDigits::default()
+        };
         assert_eq!(many.check(), Err(BuiltinError::TooMany(usize::MAX)));
         assert_eq!(with(&[3, 1, 3]).check(), Err(BuiltinError::Repeated(3)));
         assert_eq!(with(&[9, 0]).check(), Ok(()));
@@ -187,9 +223,21 @@ mod tests {
     #[test]
     fn fingerprints_tell_parameters_apart() {
         let digits = BuiltinDigits::default();
-        let more = BuiltinDigits { train_per_class: 1001, ..digits.clone() };
-        assert_ne!(digits.fingerprint(Split::Train), more.fingerprint(Split::Train));
-        assert_eq!(digits.fingerprint(Split::Test), more.fingerprint(Split::Test));
-        assert_ne!(digits.fingerprint(Split::Train), digits.fingerprint(Split::Test));
+        let more = BuiltinDigits {
+            train_per_class: 1001,
+            ..digits.clone()
+        };
+        assert_ne!(
+            digits.fingerprint(Split::Train),
+            more.fingerprint(Split::Train)
+        );
+        assert_eq!(
+            digits.fingerprint(Split::Test),
+            more.fingerprint(Split::Test)
+        );
+        assert_ne!(
+            digits.fingerprint(Split::Train),
+            digits.fingerprint(Split::Test)
+        );
     }
 }

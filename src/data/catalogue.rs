@@ -55,7 +55,11 @@ const MNIST: Published = [
         1_648_877,
         "8d422c7b0a1c1c79245a5bcf07fe86e33eeafee792b84584aec276f5a2dbc4e6",
     ),
-    ("t10k-labels-idx1-ubyte.gz", 4_542, "f7ae60f92e00ec6debd23a6088c31dbd2371eca3ffa0defaefb259924204aec6"),
+    (
+        "t10k-labels-idx1-ubyte.gz",
+        4_542,
+        "f7ae60f92e00ec6debd23a6088c31dbd2371eca3ffa0defaefb259924204aec6",
+    ),
 ];
 
 /// SHA-256 of the unpacked files of MNIST, in their order.
@@ -73,8 +77,10 @@ pub(crate) const MNIST_CONTENT: [&str; 2] = [
     "18489308deedfe2f7bd3a11e599a597126f161d991b1ffcffb71642aa76f7f62",
 ];
 
-const MNIST_MIRRORS: [&str; 2] =
-    ["https://ossci-datasets.s3.amazonaws.com/mnist/", "https://storage.googleapis.com/cvdf-datasets/mnist/"];
+const MNIST_MIRRORS: [&str; 2] = [
+    "https://ossci-datasets.s3.amazonaws.com/mnist/",
+    "https://storage.googleapis.com/cvdf-datasets/mnist/",
+];
 
 const FASHION_MNIST: Published = [
     (
@@ -92,7 +98,11 @@ const FASHION_MNIST: Published = [
         4_422_102,
         "346e55b948d973a97e58d2351dde16a484bd415d4595297633bb08f03db6a073",
     ),
-    ("t10k-labels-idx1-ubyte.gz", 5_148, "67da17c76eaffca5446c3361aaab5c3cd6d1c2608764d35dfb1850b086bf8dd5"),
+    (
+        "t10k-labels-idx1-ubyte.gz",
+        5_148,
+        "67da17c76eaffca5446c3361aaab5c3cd6d1c2608764d35dfb1850b086bf8dd5",
+    ),
 ];
 
 const FASHION_MNIST_MIRRORS: [&str; 3] = [
@@ -111,15 +121,18 @@ impl Catalogue {
             "mnist" => (&MNIST_MIRRORS, MNIST, MNIST_UNPACKED.map(Some)),
             "fashion-mnist" => (&FASHION_MNIST_MIRRORS, FASHION_MNIST, [None; 4]),
             _ => {
-                return Err(UnknownDataset { name: name.to_string() });
+                return Err(UnknownDataset {
+                    name: name.to_string(),
+                });
             }
         };
-        let file = |((name, bytes, sha256), content): ((&str, u64, &str), Option<&str>)| RemoteFile {
-            name: name.to_string(),
-            bytes,
-            sha256: sha256.to_string(),
-            content_sha256: content.map(str::to_string),
-        };
+        let file =
+            |((name, bytes, sha256), content): ((&str, u64, &str), Option<&str>)| RemoteFile {
+                name: name.to_string(),
+                bytes,
+                sha256: sha256.to_string(),
+                content_sha256: content.map(str::to_string),
+            };
         Ok(Catalogue {
             name: name.to_string(),
             mirrors: mirrors.iter().map(ToString::to_string).collect(),
@@ -132,7 +145,11 @@ impl Catalogue {
 /// under: MNIST by its content, Fashion-MNIST by its files as published.
 pub(crate) fn known_as(fingerprint: &str, files: &[FileInfo]) -> Option<&'static str> {
     let are_published = |published: &Published| {
-        let is_one = |file: &FileInfo| published.iter().any(|(_, _, sha256)| *sha256 == file.sha256);
+        let is_one = |file: &FileInfo| {
+            published
+                .iter()
+                .any(|(_, _, sha256)| *sha256 == file.sha256)
+        };
         files.len() == 2 && files.iter().all(is_one)
     };
     if MNIST_CONTENT.contains(&fingerprint) {
@@ -152,17 +169,27 @@ mod tests {
             let catalogue = Catalogue::named(name).unwrap();
             let sums: BTreeSet<&str> = catalogue.files.iter().map(|f| f.sha256.as_str()).collect();
             assert_eq!((catalogue.files.len(), sums.len()), (4, 4));
-            assert!(sums.iter().all(|sum| sum.len() == 64 && sum.chars().all(|c| c.is_ascii_hexdigit())));
+            assert!(
+                sums.iter()
+                    .all(|sum| sum.len() == 64 && sum.chars().all(|c| c.is_ascii_hexdigit()))
+            );
             assert!(catalogue.mirrors.len() >= 2);
         }
         let error = Catalogue::named("kmnist").unwrap_err().to_string();
-        assert_eq!(error, "\"kmnist\" cannot be fetched; expected mnist or fashion-mnist");
+        assert_eq!(
+            error,
+            "\"kmnist\" cannot be fetched; expected mnist or fashion-mnist"
+        );
     }
 
     #[test]
     fn splits_are_known_by_their_content_or_their_published_files() {
         let named = |fingerprint: &str, files: &[&str]| {
-            let file = |sha256: &&str| FileInfo { name: String::new(), bytes: 1, sha256: sha256.to_string() };
+            let file = |sha256: &&str| FileInfo {
+                name: String::new(),
+                bytes: 1,
+                sha256: sha256.to_string(),
+            };
             known_as(fingerprint, &files.iter().map(file).collect::<Vec<_>>())
         };
         assert_eq!(named(MNIST_CONTENT[1], &[]), Some("mnist"));

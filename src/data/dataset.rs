@@ -55,7 +55,9 @@ pub enum DatasetError {
         len: usize,
     },
     /// There are fewer images of a class than requested.
-    #[error("{dataset}: {wanted} {split} images of class {class} were asked for, there are {found}")]
+    #[error(
+        "{dataset}: {wanted} {split} images of class {class} were asked for, there are {found}"
+    )]
     TooFew {
         /// Name of the dataset.
         dataset: String,
@@ -76,7 +78,10 @@ impl From<DatasetError> for Error {
             DatasetError::Files(files) => files.remedies().to_vec(),
             _ => Vec::new(),
         };
-        Error { remedies, ..Error::input(error.to_string()) }
+        Error {
+            remedies,
+            ..Error::input(error.to_string())
+        }
     }
 }
 
@@ -111,7 +116,11 @@ impl Dataset {
     ///
     /// # Errors
     /// Returns [`DatasetError::Files`]: the file, its place, what was expected and what to do.
-    pub fn load(name: &str, given: &[DatasetPlace], wanted: &[Split]) -> Result<Self, DatasetError> {
+    pub fn load(
+        name: &str,
+        given: &[DatasetPlace],
+        wanted: &[Split],
+    ) -> Result<Self, DatasetError> {
         Dataset::oriented(name, given, wanted, None)
     }
 
@@ -140,11 +149,21 @@ impl Dataset {
                     known_as(&stored.fingerprint, &stored.files).filter(|found| *found != name)
             {
                 let (dataset, place) = (name.to_string(), place.path.display().to_string());
-                return Err(DatasetError::Other { dataset, found, place, split });
+                return Err(DatasetError::Other {
+                    dataset,
+                    found,
+                    place,
+                    split,
+                });
             }
             splits.insert(split, Loaded::new(labels, Images::Stored(stored)));
         }
-        Ok(Dataset { name: name.to_string(), folder: Some(place.path), origin: place.origin, splits })
+        Ok(Dataset {
+            name: name.to_string(),
+            folder: Some(place.path),
+            origin: place.origin,
+            splits,
+        })
     }
 
     /// Makes built-in digits with the given parameters. Images are drawn on request.
@@ -158,7 +177,12 @@ impl Dataset {
             (split, Loaded::new(labels, Images::Drawn(digits.clone())))
         };
         let splits = wanted.iter().map(loaded).collect();
-        Ok(Dataset { name: BUILTIN.to_string(), folder: None, origin: BUILTIN.to_string(), splits })
+        Ok(Dataset {
+            name: BUILTIN.to_string(),
+            folder: None,
+            origin: BUILTIN.to_string(),
+            splits,
+        })
     }
 
     /// Returns the name of the dataset.
@@ -196,7 +220,9 @@ impl Dataset {
 
     /// Returns the number of images in a split; 0 if it was not loaded.
     pub fn len(&self, split: Split) -> usize {
-        self.splits.get(&split).map_or(0, |loaded| loaded.labels.len())
+        self.splits
+            .get(&split)
+            .map_or(0, |loaded| loaded.labels.len())
     }
 
     /// Returns the image at an index of a split: 0 background … 255 ink, row 0 on top.
@@ -222,12 +248,17 @@ impl Dataset {
 
     /// Returns the indices of all images of a class in a split, ascending; none if not loaded.
     pub fn indices_of(&self, split: Split, class: u8) -> &[usize] {
-        self.splits.get(&split).and_then(|loaded| loaded.by_class.get(&class)).map_or(&[], Vec::as_slice)
+        self.splits
+            .get(&split)
+            .and_then(|loaded| loaded.by_class.get(&class))
+            .map_or(&[], Vec::as_slice)
     }
 
     /// Returns the classes that occur in a split, ascending; none if it was not loaded.
     pub(crate) fn classes(&self, split: Split) -> Vec<u8> {
-        self.splits.get(&split).map_or_else(Vec::new, |loaded| loaded.by_class.keys().copied().collect())
+        self.splits
+            .get(&split)
+            .map_or_else(Vec::new, |loaded| loaded.by_class.keys().copied().collect())
     }
 
     /// Returns a split's SHA-256 (see [`SplitInfo::fingerprint`]); `None` if it was not loaded.
@@ -247,14 +278,37 @@ impl Dataset {
                 Images::Drawn(_) => (false, Vec::new()),
             };
             let fingerprint = self.fingerprint(split).expect("the split is loaded");
-            let per_class = loaded.by_class.iter().map(|(&class, indices)| (class, indices.len())).collect();
+            let per_class = loaded
+                .by_class
+                .iter()
+                .map(|(&class, indices)| (class, indices.len()))
+                .collect();
             let images = loaded.labels.len();
-            (split, SplitInfo { images, height, width, fingerprint, transposed, per_class, files })
+            (
+                split,
+                SplitInfo {
+                    images,
+                    height,
+                    width,
+                    fingerprint,
+                    transposed,
+                    per_class,
+                    files,
+                },
+            )
         };
         let splits = self.splits.iter().map(describe).collect();
-        let source = self.folder.as_ref().map_or(BUILTIN.to_string(), |folder| folder.display().to_string());
+        let source = self
+            .folder
+            .as_ref()
+            .map_or(BUILTIN.to_string(), |folder| folder.display().to_string());
         let (name, origin) = (self.name.clone(), self.origin.clone());
-        DatasetInfo { name, source, origin, splits }
+        DatasetInfo {
+            name,
+            source,
+            origin,
+            splits,
+        }
     }
 
     /// Draws `per_class` different images of each class by seed and returns their indices: those of
@@ -275,7 +329,13 @@ impl Dataset {
             let all = self.indices_of(split, class);
             if all.len() < per_class {
                 let (dataset, found) = (self.name.clone(), all.len());
-                return Err(DatasetError::TooFew { dataset, split, class, wanted: per_class, found });
+                return Err(DatasetError::TooFew {
+                    dataset,
+                    split,
+                    class,
+                    wanted: per_class,
+                    found,
+                });
             }
             let child = 256 * split.code() + u64::from(class);
             let picked = stream(seed, Purpose::Images, 0, child).sample(all.len(), per_class);
@@ -285,11 +345,21 @@ impl Dataset {
     }
 
     fn loaded(&self, split: Split) -> Result<&Loaded, DatasetError> {
-        self.splits.get(&split).ok_or_else(|| DatasetError::NotLoaded { dataset: self.name.clone(), split })
+        self.splits
+            .get(&split)
+            .ok_or_else(|| DatasetError::NotLoaded {
+                dataset: self.name.clone(),
+                split,
+            })
     }
 
     fn no_such(&self, split: Split, index: usize) -> DatasetError {
-        DatasetError::Index { dataset: self.name.clone(), split, index, len: self.len(split) }
+        DatasetError::Index {
+            dataset: self.name.clone(),
+            split,
+            index,
+            len: self.len(split),
+        }
     }
 }
 
@@ -299,7 +369,11 @@ impl Loaded {
         for (index, &label) in labels.iter().enumerate() {
             by_class.entry(label).or_default().push(index);
         }
-        Loaded { labels, by_class, images }
+        Loaded {
+            labels,
+            by_class,
+            images,
+        }
     }
 }
 
@@ -315,7 +389,10 @@ mod tests {
     fn draws_are_even_distinct_and_fixed_by_seed() {
         let data = digits();
         let drawn = data.draw(Split::Test, &[4, 9], 100, 5).unwrap();
-        let labels: Vec<u8> = drawn.iter().map(|&i| data.label(Split::Test, i).unwrap()).collect();
+        let labels: Vec<u8> = drawn
+            .iter()
+            .map(|&i| data.label(Split::Test, i).unwrap())
+            .collect();
         assert!(labels[..100].iter().all(|&l| l == 4) && labels[100..].iter().all(|&l| l == 9));
         let mut distinct = drawn.clone();
         distinct.sort_unstable();
@@ -325,17 +402,40 @@ mod tests {
         assert_eq!(drawn[..100], data.draw(Split::Test, &[4], 100, 5).unwrap());
         assert_ne!(drawn, data.draw(Split::Test, &[4, 9], 100, 6).unwrap());
         let error = data.draw(Split::Test, &[4], 501, 5).unwrap_err();
-        assert!(matches!(error, DatasetError::TooFew { class: 4, wanted: 501, found: 500, .. }), "{error}");
+        assert!(
+            matches!(
+                error,
+                DatasetError::TooFew {
+                    class: 4,
+                    wanted: 501,
+                    found: 500,
+                    ..
+                }
+            ),
+            "{error}"
+        );
     }
 
     #[test]
     fn indices_and_splits_that_are_not_there_are_errors() {
         let data = Dataset::load(BUILTIN, &[], &[Split::Train]).unwrap();
         let error = data.image(Split::Train, 10_000).unwrap_err().to_string();
-        assert_eq!(error, "builtin: there is no train image 10000: there are 10000, counted from 0");
-        assert!(matches!(data.label(Split::Test, 0), Err(DatasetError::NotLoaded { .. })));
-        assert!(matches!(data.draw(Split::Test, &[1], 1, 1), Err(DatasetError::NotLoaded { .. })));
-        assert_eq!((data.len(Split::Test), data.fingerprint(Split::Test)), (0, None));
+        assert_eq!(
+            error,
+            "builtin: there is no train image 10000: there are 10000, counted from 0"
+        );
+        assert!(matches!(
+            data.label(Split::Test, 0),
+            Err(DatasetError::NotLoaded { .. })
+        ));
+        assert!(matches!(
+            data.draw(Split::Test, &[1], 1, 1),
+            Err(DatasetError::NotLoaded { .. })
+        ));
+        assert_eq!(
+            (data.len(Split::Test), data.fingerprint(Split::Test)),
+            (0, None)
+        );
     }
 
     #[test]

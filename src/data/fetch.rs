@@ -52,7 +52,11 @@ impl Program {
     /// Returns true if it is on the PATH.
     pub fn is_installed(self) -> bool {
         let mut command = Command::new(self.name());
-        command.arg("--version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+        command
+            .arg("--version")
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null());
         command.status().is_ok()
     }
 
@@ -64,14 +68,41 @@ impl Program {
         match self {
             // -q comes first: a user's .curlrc may change the meaning of anything.
             Program::Curl => command
-                .args(["-q", "--silent", "--show-error", "--fail", "--location", "--globoff"])
-                .args(["--proto", "=http,https", "--proto-redir", "=http,https", "--max-redirs", "10"])
-                .args(["--connect-timeout", "15", "--speed-limit", "1", "--speed-time", "30"])
+                .args([
+                    "-q",
+                    "--silent",
+                    "--show-error",
+                    "--fail",
+                    "--location",
+                    "--globoff",
+                ])
+                .args([
+                    "--proto",
+                    "=http,https",
+                    "--proto-redir",
+                    "=http,https",
+                    "--max-redirs",
+                    "10",
+                ])
+                .args([
+                    "--connect-timeout",
+                    "15",
+                    "--speed-limit",
+                    "1",
+                    "--speed-time",
+                    "30",
+                ])
                 .args(["--user-agent", agent, "--url", url]),
             // The short forms of options are the same in all programs of this name.
-            Program::Wget => command.args(["-nv", "-O", "-", "-t", "1", "-T", "20", "-U", agent, "--", url]),
+            Program::Wget => command.args([
+                "-nv", "-O", "-", "-t", "1", "-T", "20", "-U", agent, "--", url,
+            ]),
         };
-        command.env("LC_ALL", "C").stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command
+            .env("LC_ALL", "C")
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
         command
     }
 }
@@ -205,9 +236,9 @@ impl From<FetchError> for Error {
                 let error = Error::other(text).remedy(Remedy::NameMirror);
                 error.remedy(Remedy::NameData).remedy(Remedy::UseBuiltin)
             }
-            FetchError::NoProgram { .. } => {
-                Error::other(text).remedy(Remedy::NameData).remedy(Remedy::UseBuiltin)
-            }
+            FetchError::NoProgram { .. } => Error::other(text)
+                .remedy(Remedy::NameData)
+                .remedy(Remedy::UseBuiltin),
             FetchError::Stopped(stopped) => stopped.into(),
             FetchError::Differs { .. } | FetchError::Disk { .. } => Error::other(text),
         }
@@ -245,27 +276,58 @@ pub fn fetch(
     programs: &[Program],
     session: &Session,
 ) -> Result<Vec<Fetched>, FetchError> {
-    let folder = options.to.clone().unwrap_or_else(|| default_folder(&catalogue.name));
-    let mirrors = options.mirror.as_ref().map_or(catalogue.mirrors.as_slice(), std::slice::from_ref);
+    let folder = options
+        .to
+        .clone()
+        .unwrap_or_else(|| default_folder(&catalogue.name));
+    let mirrors = options
+        .mirror
+        .as_ref()
+        .map_or(catalogue.mirrors.as_slice(), std::slice::from_ref);
     let mut kept = Vec::new();
     for remote in &catalogue.files {
-        kept.push(if options.force { None } else { found(&folder, remote)? });
+        kept.push(if options.force {
+            None
+        } else {
+            found(&folder, remote)?
+        });
     }
-    let missing = catalogue.files.iter().zip(&kept).filter(|(_, kept)| kept.is_none());
+    let missing = catalogue
+        .files
+        .iter()
+        .zip(&kept)
+        .filter(|(_, kept)| kept.is_none());
     let missing: Vec<&RemoteFile> = missing.map(|(remote, _)| remote).collect();
-    let program = programs.iter().copied().find(|program| !missing.is_empty() && program.is_installed());
+    let program = programs
+        .iter()
+        .copied()
+        .find(|program| !missing.is_empty() && program.is_installed());
     if program.is_none() && !missing.is_empty() {
         let of_first = |remote: &&RemoteFile| mirrors.first().map(|mirror| address(mirror, remote));
-        return Err(FetchError::NoProgram { folder, urls: missing.iter().filter_map(of_first).collect() });
+        return Err(FetchError::NoProgram {
+            folder,
+            urls: missing.iter().filter_map(of_first).collect(),
+        });
     }
     let is_new = |folder: &&Path| !folder.as_os_str().is_empty() && !folder.exists();
-    let made: Vec<PathBuf> = folder.ancestors().take_while(is_new).map(Path::to_path_buf).collect();
-    let disk = |path: &Path, source| FetchError::Disk { path: path.to_path_buf(), source };
+    let made: Vec<PathBuf> = folder
+        .ancestors()
+        .take_while(is_new)
+        .map(Path::to_path_buf)
+        .collect();
+    let disk = |path: &Path, source| FetchError::Disk {
+        path: path.to_path_buf(),
+        source,
+    };
     std::fs::create_dir_all(&folder).map_err(|source| disk(&folder, source))?;
     let bring = |remote: &RemoteFile| -> Result<Fetched, FetchError> {
         let program = program.expect("without one, nothing is missing");
         let (url, bytes) = from_any(program, mirrors, remote, session)?.map_err(|attempts| {
-            FetchError::Mirrors { file: remote.name.clone(), folder: folder.clone(), attempts }
+            FetchError::Mirrors {
+                file: remote.name.clone(),
+                folder: folder.clone(),
+                attempts,
+            }
         })?;
         let file = folder.join(&remote.name);
         write_atomically(&file, &bytes).map_err(|source| disk(&file, source))?;
@@ -275,23 +337,37 @@ pub fn fetch(
         if let Some(other) = other.filter(is_other) {
             std::fs::remove_file(&other).map_err(|source| disk(&other, source))?;
         }
-        Ok(Fetched { file, outcome: FetchOutcome::Downloaded(url) })
+        Ok(Fetched {
+            file,
+            outcome: FetchOutcome::Downloaded(url),
+        })
     };
-    let fetched = catalogue.files.iter().zip(kept).map(|(remote, kept)| match kept {
-        Some(file) => Ok(Fetched { file, outcome: FetchOutcome::Kept }),
-        None => bring(remote),
-    });
+    let fetched = catalogue
+        .files
+        .iter()
+        .zip(kept)
+        .map(|(remote, kept)| match kept {
+            Some(file) => Ok(Fetched {
+                file,
+                outcome: FetchOutcome::Kept,
+            }),
+            None => bring(remote),
+        });
     let fetched: Result<Vec<Fetched>, FetchError> = fetched.collect();
     if fetched.is_err() {
         // Folders that are not empty stay.
-        made.iter().for_each(|folder| drop(std::fs::remove_dir(folder)));
+        made.iter()
+            .for_each(|folder| drop(std::fs::remove_dir(folder)));
     }
     fetched
 }
 
 /// Returns the path of a file in a folder after unpacking.
 fn unpacked(folder: &Path, remote: &RemoteFile) -> Option<PathBuf> {
-    remote.name.strip_suffix(".gz").map(|name| folder.join(name))
+    remote
+        .name
+        .strip_suffix(".gz")
+        .map(|name| folder.join(name))
 }
 
 /// Returns the right file, packed or not, if it exists; another one is an error.
@@ -307,9 +383,19 @@ fn found(folder: &Path, remote: &RemoteFile) -> Result<Option<PathBuf>, FetchErr
             Err(source) => return Err(FetchError::Disk { path: file, source }),
         };
         let (expected, found) = (remote.sha256.clone(), sha256_hex(&bytes));
-        let content = || idx::unpacked(&file).ok().map(|content| sha256_hex(&content));
-        if found != expected && (remote.content_sha256.is_none() || content() != remote.content_sha256) {
-            return Err(FetchError::Differs { file, expected, found });
+        let content = || {
+            idx::unpacked(&file)
+                .ok()
+                .map(|content| sha256_hex(&content))
+        };
+        if found != expected
+            && (remote.content_sha256.is_none() || content() != remote.content_sha256)
+        {
+            return Err(FetchError::Differs {
+                file,
+                expected,
+                found,
+            });
         }
         right.get_or_insert(file);
     }
@@ -334,14 +420,18 @@ fn from_any(
     let mut attempts = Vec::new();
     for mirror in mirrors {
         let url = address(mirror, remote);
-        session.observer.begins(&Work::new(remote.name.clone(), remote.bytes, "bytes"));
+        session
+            .observer
+            .begins(&Work::new(remote.name.clone(), remote.bytes, "bytes"));
         let downloaded = download(program, &url, remote, session);
         // A signal from the keyboard ends the program, too.
         session.check()?;
         match downloaded {
             Ok(bytes) => {
                 if !attempts.is_empty() {
-                    session.observer.warning(&format!("{}: {}", remote.name, tried(&attempts)));
+                    session
+                        .observer
+                        .warning(&format!("{}: {}", remote.name, tried(&attempts)));
                 }
                 return Ok(Ok((url, bytes)));
             }
@@ -369,7 +459,11 @@ fn download(
     remote: &RemoteFile,
     session: &Session,
 ) -> Result<Vec<u8>, AttemptError> {
-    let scheme = url.split("://").next().unwrap_or_default().to_ascii_lowercase();
+    let scheme = url
+        .split("://")
+        .next()
+        .unwrap_or_default()
+        .to_ascii_lowercase();
     if !["http", "https"].contains(&scheme.as_str()) {
         return Err(AttemptError::Address);
     }
@@ -378,7 +472,8 @@ fn download(
     let mut running = Running(program.command(url).spawn().map_err(io)?);
     let output = running.0.stdout.take().expect("piped");
     // One byte more than expected is enough to detect a file that is too long.
-    let pieces = pieces(output.take(remote.bytes + 1)).map_err(|error| failed(error.to_string()))?;
+    let pieces =
+        pieces(output.take(remote.bytes + 1)).map_err(|error| failed(error.to_string()))?;
     let mut bytes = Vec::new();
     let begin = Instant::now();
     loop {
@@ -445,7 +540,10 @@ fn pieces(mut output: impl Read + Send + 'static) -> Result<Receiver<io::Result<
 /// Returns a program's last message, without its name and an error's address and time.
 fn last_line(program: Program, said: &str) -> Option<String> {
     let line = said.lines().map(str::trim).rfind(|line| !line.is_empty())?;
-    let line = line.strip_prefix(program.name()).and_then(|line| line.strip_prefix(": ")).unwrap_or(line);
+    let line = line
+        .strip_prefix(program.name())
+        .and_then(|line| line.strip_prefix(": "))
+        .unwrap_or(line);
     let line = line.split_once(" ERROR ").map_or(line, |(_, error)| error);
     Some(line.trim_end_matches('.').to_string())
 }

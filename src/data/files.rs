@@ -46,7 +46,9 @@ pub fn places(
     environment: Option<OsString>,
     config: Option<&Path>,
 ) -> Vec<DatasetPlace> {
-    let environment = environment.filter(|value| !value.is_empty()).map(PathBuf::from);
+    let environment = environment
+        .filter(|value| !value.is_empty())
+        .map(PathBuf::from);
     [
         ("as given", option.map(Path::to_path_buf)),
         ("MORPHCOG_DATA", environment),
@@ -54,7 +56,10 @@ pub fn places(
     ]
     .into_iter()
     .filter_map(|(origin, path)| {
-        Some(DatasetPlace { origin: origin.to_string(), path: home_expanded(&path?) })
+        Some(DatasetPlace {
+            origin: origin.to_string(),
+            path: home_expanded(&path?),
+        })
     })
     .collect()
 }
@@ -190,10 +195,20 @@ pub(crate) fn choose(name: &str, given: &[DatasetPlace]) -> Result<DatasetPlace,
     Ok(match given.first() {
         Some(place) => {
             let own = place.path.join(name);
-            let path = if own.is_dir() { own } else { place.path.clone() };
-            DatasetPlace { origin: place.origin.clone(), path }
+            let path = if own.is_dir() {
+                own
+            } else {
+                place.path.clone()
+            };
+            DatasetPlace {
+                origin: place.origin.clone(),
+                path,
+            }
         }
-        None => DatasetPlace { origin: "default".to_string(), path: default_folder(name) },
+        None => DatasetPlace {
+            origin: "default".to_string(),
+            path: default_folder(name),
+        },
     })
 }
 
@@ -205,8 +220,10 @@ pub(crate) fn load(
     split: Split,
     transpose: Option<bool>,
 ) -> Result<(Vec<u8>, StoredSplit), FilesError> {
-    let broken =
-        |source: IdxError| FilesError::Broken { remedies: remedies(name, place, !source.is_io()), source };
+    let broken = |source: IdxError| FilesError::Broken {
+        remedies: remedies(name, place, !source.is_io()),
+        source,
+    };
     let (image_file, beginning) = find(name, place, split, "images", None)?;
     // Another set in the same folder might have as many labels.
     let (label_file, _) = find(name, place, split, "labels", Some(&beginning))?;
@@ -219,17 +236,32 @@ pub(crate) fn load(
     let (expected, found) = (images.content.count, labels.content.len());
     if expected != found {
         let remedies = remedies(name, place, true);
-        return Err(FilesError::Count { label_file, labels: found, image_file, images: expected, remedies });
+        return Err(FilesError::Count {
+            label_file,
+            labels: found,
+            image_file,
+            images: expected,
+            remedies,
+        });
     }
     let mut hash = Sha256::new();
-    let sizes = [images.content.count, images.content.height, images.content.width].map(|n| n as u32);
+    let sizes = [
+        images.content.count,
+        images.content.height,
+        images.content.width,
+    ]
+    .map(|n| n as u32);
     hash.update(idx::header(&sizes));
     hash.update(&images.content.pixels);
     hash.update(idx::header(&sizes[..1]));
     hash.update(&labels.content);
     let fingerprint = hex(&hash.finalize());
     let describe = |path: &Path, bytes, sha256: &str| FileInfo {
-        name: path.file_name().expect("it was read as a file").to_string_lossy().into_owned(),
+        name: path
+            .file_name()
+            .expect("it was read as a file")
+            .to_string_lossy()
+            .into_owned(),
         bytes,
         sha256: sha256.to_string(),
     };
@@ -237,18 +269,30 @@ pub(crate) fn load(
         describe(&image_file, images.bytes, &images.sha256),
         describe(&label_file, labels.bytes, &labels.sha256),
     ];
-    Ok((labels.content, StoredSplit { images: images.content, transposed, files, fingerprint }))
+    Ok((
+        labels.content,
+        StoredSplit {
+            images: images.content,
+            transposed,
+            files,
+            fingerprint,
+        },
+    ))
 }
 
 /// Returns true if images are EMNIST's, which is published with rows and columns exchanged, by the
 /// names of their dataset, file or folder. (A published dataset may be in a folder of any name.)
 fn is_emnist(dataset: &str, place: &DatasetPlace, image_file: &Path) -> bool {
-    let folder = place.path.canonicalize().unwrap_or_else(|_| place.path.clone());
+    let folder = place
+        .path
+        .canonicalize()
+        .unwrap_or_else(|_| place.path.clone());
     let folder = folder.file_name().filter(|_| !FETCHABLE.contains(&dataset));
     let names = [Some(dataset.as_ref()), image_file.file_name(), folder];
     names.into_iter().flatten().any(|name| {
         let name = name.to_string_lossy();
-        name.split(|c: char| !c.is_ascii_alphanumeric()).any(|word| word.eq_ignore_ascii_case("emnist"))
+        name.split(|c: char| !c.is_ascii_alphanumeric())
+            .any(|word| word.eq_ignore_ascii_case("emnist"))
     })
 }
 
@@ -259,7 +303,8 @@ fn standard_names(split: Split, content: &str) -> Vec<String> {
         Split::Test => &["t10k", "test"],
     };
     let kind = if content == "images" { "idx3" } else { "idx1" };
-    let spelled = |stem: &&str| ["-", "."].map(|mark| format!("{stem}-{content}{mark}{kind}-ubyte"));
+    let spelled =
+        |stem: &&str| ["-", "."].map(|mark| format!("{stem}-{content}{mark}{kind}-ubyte"));
     stems.iter().flat_map(spelled).collect()
 }
 
@@ -279,7 +324,12 @@ fn find(
         Ok(present) => present,
         Err(source) => {
             let remedies = remedies(name, place, false);
-            return Err(FilesError::Folder { dataset, place: searched, source, remedies });
+            return Err(FilesError::Folder {
+                dataset,
+                place: searched,
+                source,
+                remedies,
+            });
         }
     };
     let standard = standard_names(split, content);
@@ -289,12 +339,17 @@ fn find(
         let base = bare(file);
         let is_meant = beginning.is_none_or(|beginning| begins(&base, content) == beginning);
         if is_meant && standard.iter().any(|name| base.ends_with(name.as_str())) {
-            let place = standard.iter().position(|name| base == *name).unwrap_or(standard.len());
+            let place = standard
+                .iter()
+                .position(|name| base == *name)
+                .unwrap_or(standard.len());
             found.push((place, base, file));
         }
     }
     found.sort_by_key(|(place, ..)| *place);
-    let is_standard = found.first().is_some_and(|(place, ..)| *place < standard.len());
+    let is_standard = found
+        .first()
+        .is_some_and(|(place, ..)| *place < standard.len());
     found.retain(|(place, ..)| *place < standard.len() || !is_standard);
     let Some((_, base, file)) = found.first() else {
         let usual = &standard[0];
@@ -303,13 +358,26 @@ fn find(
             None => usual.clone(),
         };
         let remedies = remedies(name, place, false);
-        return Err(FilesError::Missing { dataset, split, content, expected, place: searched, remedies });
+        return Err(FilesError::Missing {
+            dataset,
+            split,
+            content,
+            expected,
+            place: searched,
+            remedies,
+        });
     };
     let is_one = is_standard || found.iter().all(|(_, other, _)| other == base);
     let files: Vec<&String> = found.iter().map(|(.., file)| *file).collect();
     if !is_one || !hold_the_same(name, place, &files)? {
         let found = files.into_iter().rev().cloned().collect();
-        return Err(FilesError::Ambiguous { dataset, split, content, place: searched, found });
+        return Err(FilesError::Ambiguous {
+            dataset,
+            split,
+            content,
+            place: searched,
+            found,
+        });
     }
     Ok((place.path.join(file), begins(base, content).to_string()))
 }
@@ -328,7 +396,10 @@ fn hold_the_same(name: &str, place: &DatasetPlace, files: &[&String]) -> Result<
     let mut sums = BTreeSet::new();
     for file in files {
         let unpacked = idx::unpacked(&place.path.join(file));
-        let broken = |source| FilesError::Broken { remedies: remedies(name, place, true), source };
+        let broken = |source| FilesError::Broken {
+            remedies: remedies(name, place, true),
+            source,
+        };
         sums.insert(sha256_hex(&unpacked.map_err(broken)?));
     }
     Ok(sums.len() == 1)
@@ -346,7 +417,13 @@ fn file_names(folder: &Path) -> io::Result<BTreeSet<String>> {
     for entry in std::fs::read_dir(folder)? {
         let entry = entry?;
         if !entry.path().is_dir() {
-            names.extend(entry.file_name().into_string().ok().filter(|name| !name.starts_with('.')));
+            names.extend(
+                entry
+                    .file_name()
+                    .into_string()
+                    .ok()
+                    .filter(|name| !name.starts_with('.')),
+            );
         }
     }
     Ok(names)
@@ -380,8 +457,16 @@ mod tests {
         let pixels: Vec<u8> = (0..count).flat_map(|i| [i; 6]).collect();
         let values: Vec<u8> = (0..count).map(|i| 10 - i).collect();
         let count = u32::from(count);
-        fs::write(folder.join(images), [idx::header(&[count, 2, 3]), pixels].concat()).unwrap();
-        fs::write(folder.join(labels), [idx::header(&[count]), values].concat()).unwrap();
+        fs::write(
+            folder.join(images),
+            [idx::header(&[count, 2, 3]), pixels].concat(),
+        )
+        .unwrap();
+        fs::write(
+            folder.join(labels),
+            [idx::header(&[count]), values].concat(),
+        )
+        .unwrap();
     }
 
     fn given(folder: &Path) -> Vec<DatasetPlace> {
@@ -389,7 +474,9 @@ mod tests {
     }
 
     fn failure(name: &str, folder: &Path, split: Split) -> String {
-        Dataset::load(name, &given(folder), &[split]).unwrap_err().to_string()
+        Dataset::load(name, &given(folder), &[split])
+            .unwrap_err()
+            .to_string()
     }
 
     fn remedies_of(name: &str, folder: &Path, split: Split) -> Vec<Remedy> {
@@ -398,15 +485,29 @@ mod tests {
 
     /// Returns the command that downloads a dataset into a folder.
     fn fetching(name: &str, folder: &Path) -> Invocation {
-        Invocation::new("data fetch").value(name).option("to", folder)
+        Invocation::new("data fetch")
+            .value(name)
+            .option("to", folder)
     }
 
     #[test]
     fn standard_names_in_every_spelling_are_found() {
         for (images, labels, split) in [
-            ("train-images-idx3-ubyte", "train-labels-idx1-ubyte", Split::Train),
-            ("train-images.idx3-ubyte", "train-labels.idx1-ubyte.gz", Split::Train),
-            ("t10k-images-idx3-ubyte.gz", "t10k-labels.idx1-ubyte", Split::Test),
+            (
+                "train-images-idx3-ubyte",
+                "train-labels-idx1-ubyte",
+                Split::Train,
+            ),
+            (
+                "train-images.idx3-ubyte",
+                "train-labels.idx1-ubyte.gz",
+                Split::Train,
+            ),
+            (
+                "t10k-images-idx3-ubyte.gz",
+                "t10k-labels.idx1-ubyte",
+                Split::Test,
+            ),
             (
                 "emnist-digits-test-images-idx3-ubyte.gz",
                 "emnist-digits-test-labels-idx1-ubyte.gz",
@@ -416,9 +517,20 @@ mod tests {
             let folder = tempfile::tempdir().unwrap();
             write(folder.path(), images, labels, 3);
             let data = Dataset::load("own", &given(folder.path()), &[split]).unwrap();
-            assert_eq!((data.len(split), data.label(split, 2).unwrap()), (3, 8), "{images}");
-            let [height, width] = if images.starts_with("emnist") { [3, 2] } else { [2, 3] };
-            assert_eq!(data.image(split, 2).unwrap(), crate::base::Grid::filled(height, width, 2));
+            assert_eq!(
+                (data.len(split), data.label(split, 2).unwrap()),
+                (3, 8),
+                "{images}"
+            );
+            let [height, width] = if images.starts_with("emnist") {
+                [3, 2]
+            } else {
+                [2, 3]
+            };
+            assert_eq!(
+                data.image(split, 2).unwrap(),
+                crate::base::Grid::filled(height, width, 2)
+            );
             assert_eq!(data.indices_of(split, 9), [1]);
             assert_eq!(data.info().splits[&split].files[0].name, images);
         }
@@ -427,22 +539,45 @@ mod tests {
     #[test]
     fn only_the_wanted_split_needs_its_files() {
         let folder = tempfile::tempdir().unwrap();
-        write(folder.path(), "train-images-idx3-ubyte", "train-labels-idx1-ubyte", 3);
+        write(
+            folder.path(),
+            "train-images-idx3-ubyte",
+            "train-labels-idx1-ubyte",
+            3,
+        );
         assert!(Dataset::load("mnist", &given(folder.path()), &[Split::Train]).is_ok());
         let message = failure("mnist", folder.path(), Split::Test);
         let remedies = remedies_of("mnist", folder.path(), Split::Test);
-        assert_eq!(remedies, [Remedy::Run(fetching("mnist", folder.path()), "downloads it")]);
+        assert_eq!(
+            remedies,
+            [Remedy::Run(
+                fetching("mnist", folder.path()),
+                "downloads it"
+            )]
+        );
         for part in ["test images", "t10k-images-idx3-ubyte", "as given"] {
             assert!(message.contains(part), "{part}: {message}");
         }
-        assert!(message.contains(folder.path().to_str().unwrap()), "{message}");
+        assert!(
+            message.contains(folder.path().to_str().unwrap()),
+            "{message}"
+        );
     }
 
     #[test]
     fn the_first_given_place_is_used_and_has_to_work() {
         let (good, empty) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-        write(good.path(), "train-images-idx3-ubyte", "train-labels-idx1-ubyte", 3);
-        let both = places(Some(empty.path()), Some(good.path().into()), Some(good.path()));
+        write(
+            good.path(),
+            "train-images-idx3-ubyte",
+            "train-labels-idx1-ubyte",
+            3,
+        );
+        let both = places(
+            Some(empty.path()),
+            Some(good.path().into()),
+            Some(good.path()),
+        );
         let origins: Vec<&str> = both.iter().map(|p| p.origin.as_str()).collect();
         assert_eq!(origins, ["as given", "MORPHCOG_DATA", "[data] dir"]);
         assert!(Dataset::load("mnist", &both, &[Split::Train]).is_err());
@@ -454,18 +589,36 @@ mod tests {
     #[test]
     fn a_subfolder_with_the_datasets_name_comes_first() {
         let folder = tempfile::tempdir().unwrap();
-        write(folder.path(), "train-images-idx3-ubyte", "train-labels-idx1-ubyte", 3);
+        write(
+            folder.path(),
+            "train-images-idx3-ubyte",
+            "train-labels-idx1-ubyte",
+            3,
+        );
         fs::create_dir(folder.path().join("own")).unwrap();
-        write(&folder.path().join("own"), "train-images-idx3-ubyte", "train-labels-idx1-ubyte", 5);
-        let load =
-            |name| Dataset::load(name, &given(folder.path()), &[Split::Train]).unwrap().len(Split::Train);
+        write(
+            &folder.path().join("own"),
+            "train-images-idx3-ubyte",
+            "train-labels-idx1-ubyte",
+            5,
+        );
+        let load = |name| {
+            Dataset::load(name, &given(folder.path()), &[Split::Train])
+                .unwrap()
+                .len(Split::Train)
+        };
         assert_eq!((load("own"), load("mnist")), (5, 3));
     }
 
     #[test]
     fn broken_files_are_named_with_the_command_that_helps() {
         let folder = tempfile::tempdir().unwrap();
-        write(folder.path(), "train-images-idx3-ubyte", "train-labels-idx1-ubyte", 3);
+        write(
+            folder.path(),
+            "train-images-idx3-ubyte",
+            "train-labels-idx1-ubyte",
+            3,
+        );
         let labels = folder.path().join("train-labels-idx1-ubyte");
         fs::write(&labels, [idx::header(&[2]), vec![1, 2]].concat()).unwrap();
         let message = failure("mnist", folder.path(), Split::Train);
@@ -512,28 +665,47 @@ mod tests {
             *bytes.last_mut().unwrap() = 99;
             fs::write(folder.path().join(other), bytes).unwrap();
             let message = failure("own", folder.path(), Split::Train);
-            assert!(message.contains(&plain) && message.contains(other), "{message}");
+            assert!(
+                message.contains(&plain) && message.contains(other),
+                "{message}"
+            );
             fs::remove_file(folder.path().join(other)).unwrap();
         }
         // A truncated copy is no copy.
         fs::write(folder.path().join(&zipped), [0x1f, 0x8b]).unwrap();
         let message = failure("own", folder.path(), Split::Train);
-        assert!(message.contains("cannot be unpacked") && message.contains(&zipped), "{message}");
+        assert!(
+            message.contains("cannot be unpacked") && message.contains(&zipped),
+            "{message}"
+        );
     }
 
     #[test]
     fn names_in_capitals_are_those_in_small_letters() {
         let folder = tempfile::tempdir().unwrap();
-        write(folder.path(), "TRAIN-IMAGES.IDX3-UBYTE", "Train-Labels-idx1-ubyte.GZ", 3);
+        write(
+            folder.path(),
+            "TRAIN-IMAGES.IDX3-UBYTE",
+            "Train-Labels-idx1-ubyte.GZ",
+            3,
+        );
         let data = Dataset::load("own", &given(folder.path()), &[Split::Train]).unwrap();
-        assert_eq!(data.info().splits[&Split::Train].files[1].name, "Train-Labels-idx1-ubyte.GZ");
+        assert_eq!(
+            data.info().splits[&Split::Train].files[1].name,
+            "Train-Labels-idx1-ubyte.GZ"
+        );
     }
 
     #[test]
     #[cfg(unix)]
     fn a_link_that_leads_nowhere_is_broken_and_not_missing() {
         let folder = tempfile::tempdir().unwrap();
-        write(folder.path(), "train-images-idx3-ubyte", "train-labels-idx1-ubyte", 3);
+        write(
+            folder.path(),
+            "train-images-idx3-ubyte",
+            "train-labels-idx1-ubyte",
+            3,
+        );
         let images = folder.path().join("train-images-idx3-ubyte");
         fs::rename(&images, folder.path().join("elsewhere")).unwrap();
         std::os::unix::fs::symlink("elsewhere", &images).unwrap();
@@ -541,7 +713,10 @@ mod tests {
         fs::remove_file(folder.path().join("elsewhere")).unwrap();
         let message = failure("own", folder.path(), Split::Train);
         let expected = format!("{}: cannot be read", images.display());
-        assert!(message.starts_with(&expected) && message.contains("link to elsewhere"), "{message}");
+        assert!(
+            message.starts_with(&expected) && message.contains("link to elsewhere"),
+            "{message}"
+        );
     }
 
     /// Writes a single image of two rows of three pixels, 0 to 5, and returns it as loaded.
@@ -553,14 +728,19 @@ mod tests {
         fs::write(name("labels-idx1"), [idx::header(&[1]), vec![7]].concat()).unwrap();
         let data = Dataset::oriented(dataset, &given(folder), &[Split::Train], transpose).unwrap();
         let image = data.image(Split::Train, 0).unwrap();
-        (0..image.height()).map(|r| (0..image.width()).map(|c| image[(r, c)]).collect()).collect()
+        (0..image.height())
+            .map(|r| (0..image.width()).map(|c| image[(r, c)]).collect())
+            .collect()
     }
 
     #[test]
     fn emnist_is_transposed_by_its_names_and_other_images_where_that_is_asked_for() {
         let root = tempfile::tempdir().unwrap();
         let at = |name: &str| root.path().join(name);
-        let (stored, turned) = (vec![vec![0, 1, 2], vec![3, 4, 5]], vec![vec![0, 3], vec![1, 4], vec![2, 5]]);
+        let (stored, turned) = (
+            vec![vec![0, 1, 2], vec![3, 4, 5]],
+            vec![vec![0, 3], vec![1, 4], vec![2, 5]],
+        );
         assert_eq!(seen("own", &at("a"), "emnist-letters-", None), turned);
         assert_eq!(seen("emnist-digits", &at("b"), "", None), turned);
         assert_eq!(seen("own", &at("EMNIST"), "", None), turned);
@@ -569,7 +749,10 @@ mod tests {
         // A similar name, whose images are upright.
         assert_eq!(seen("femnist", &at("d"), "femnist-", None), stored);
         assert_eq!(seen("own", &at("e"), "", Some(true)), turned);
-        assert_eq!(seen("own", &at("f"), "emnist-letters-", Some(false)), stored);
+        assert_eq!(
+            seen("own", &at("f"), "emnist-letters-", Some(false)),
+            stored
+        );
     }
 
     #[test]
@@ -577,12 +760,16 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         seen("own", folder.path(), "", None);
         let load = |transpose| {
-            let data = Dataset::oriented("own", &given(folder.path()), &[Split::Train], transpose).unwrap();
+            let data = Dataset::oriented("own", &given(folder.path()), &[Split::Train], transpose)
+                .unwrap();
             data.info().splits[&Split::Train].clone()
         };
         let (stored, turned) = (load(None), load(Some(true)));
         assert_ne!(stored.fingerprint, turned.fingerprint);
-        assert_eq!((turned.height, turned.width, turned.files), (3, 2, stored.files));
+        assert_eq!(
+            (turned.height, turned.width, turned.files),
+            (3, 2, stored.files)
+        );
         assert!(turned.transposed && !stored.transposed);
     }
 
@@ -590,22 +777,43 @@ mod tests {
     fn names_that_are_paths_and_missing_folders_are_errors() {
         for name in ["../mnist", "", "a/b", ".hidden"] {
             let error = Dataset::load(name, &[], &[Split::Train]).unwrap_err();
-            assert!(matches!(error, DatasetError::Files(FilesError::Name(_))), "{error}");
+            assert!(
+                matches!(error, DatasetError::Files(FilesError::Name(_))),
+                "{error}"
+            );
         }
         let message = failure("fashion-mnist", Path::new("no/such/folder"), Split::Train);
         assert!(message.contains("no/such/folder"), "{message}");
         let missing = Path::new("no/such/folder");
         let remedies = remedies_of("fashion-mnist", missing, Split::Train);
-        assert_eq!(remedies, [Remedy::Run(fetching("fashion-mnist", missing), "downloads it")]);
+        assert_eq!(
+            remedies,
+            [Remedy::Run(
+                fetching("fashion-mnist", missing),
+                "downloads it"
+            )]
+        );
     }
 
     #[test]
     fn the_fingerprint_is_that_of_the_unpacked_files_in_a_row() {
         let folder = tempfile::tempdir().unwrap();
-        write(folder.path(), "train-images-idx3-ubyte", "train-labels-idx1-ubyte", 3);
+        write(
+            folder.path(),
+            "train-images-idx3-ubyte",
+            "train-labels-idx1-ubyte",
+            3,
+        );
         let read = |name: &str| fs::read(folder.path().join(name)).unwrap();
-        let both = [read("train-images-idx3-ubyte"), read("train-labels-idx1-ubyte")].concat();
+        let both = [
+            read("train-images-idx3-ubyte"),
+            read("train-labels-idx1-ubyte"),
+        ]
+        .concat();
         let data = Dataset::load("own", &given(folder.path()), &[Split::Train]).unwrap();
-        assert_eq!(data.fingerprint(Split::Train).unwrap(), crate::base::hash::sha256_hex(&both));
+        assert_eq!(
+            data.fingerprint(Split::Train).unwrap(),
+            crate::base::hash::sha256_hex(&both)
+        );
     }
 }

@@ -47,10 +47,18 @@ impl IdxImages {
         let mut image = Vec::with_capacity(height.saturating_mul(width).min(self.pixels.len()));
         for pixels in self.pixels.chunks_exact_mut(height * width) {
             image.clear();
-            image.extend((0..width).flat_map(|c| (0..height).map(move |r| r * width + c)).map(|i| pixels[i]));
+            image.extend(
+                (0..width)
+                    .flat_map(|c| (0..height).map(move |r| r * width + c))
+                    .map(|i| pixels[i]),
+            );
             pixels.copy_from_slice(&image);
         }
-        IdxImages { height: width, width: height, ..self }
+        IdxImages {
+            height: width,
+            width: height,
+            ..self
+        }
     }
 }
 
@@ -202,7 +210,15 @@ pub(crate) fn read_images(file: &Path) -> Result<IdxFile<IdxImages>, IdxError> {
     let stored = read_file(file)?;
     let (sizes, pixels) = decode::<3>(file, &stored, "images", "count, rows, columns")?;
     let [count, height, width] = sizes;
-    Ok(with_origin(&stored, IdxImages { count, height, width, pixels }))
+    Ok(with_origin(
+        &stored,
+        IdxImages {
+            count,
+            height,
+            width,
+            pixels,
+        },
+    ))
 }
 
 /// Reads labels, an IDX1 file of unsigned bytes, raw or gzipped (detected by content, not by name).
@@ -223,20 +239,34 @@ pub(crate) fn header(sizes: &[u32]) -> Vec<u8> {
 }
 
 fn with_origin<T>(stored: &[u8], content: T) -> IdxFile<T> {
-    IdxFile { content, bytes: stored.len() as u64, sha256: sha256_hex(stored) }
+    IdxFile {
+        content,
+        bytes: stored.len() as u64,
+        sha256: sha256_hex(stored),
+    }
 }
 
 fn read_file(file: &Path) -> Result<Vec<u8>, IdxError> {
-    let io = |source| IdxError::Io { file: file.to_path_buf(), source };
+    let io = |source| IdxError::Io {
+        file: file.to_path_buf(),
+        source,
+    };
     let found = std::fs::metadata(file).map_err(|error| io(nowhere(file, error)))?;
     // Opening a pipe would wait for a writer.
     if !found.is_file() {
         return Err(io(io::Error::other("it is not a regular file")));
     }
     let mut stored = Vec::new();
-    open_file(file).map_err(io)?.take(MAX_BYTES + 1).read_to_end(&mut stored).map_err(io)?;
+    open_file(file)
+        .map_err(io)?
+        .take(MAX_BYTES + 1)
+        .read_to_end(&mut stored)
+        .map_err(io)?;
     if stored.len() as u64 > MAX_BYTES {
-        return Err(IdxError::Large { file: file.to_path_buf(), found: found.len() });
+        return Err(IdxError::Large {
+            file: file.to_path_buf(),
+            found: found.len(),
+        });
     }
     Ok(stored)
 }
@@ -244,9 +274,10 @@ fn read_file(file: &Path) -> Result<Vec<u8>, IdxError> {
 /// Explains why a file is missing: a link to it may be broken.
 fn nowhere(file: &Path, error: io::Error) -> io::Error {
     match file.read_link() {
-        Ok(to) if error.kind() == io::ErrorKind::NotFound => {
-            io::Error::new(error.kind(), format!("it is a link to {}, which is not there", to.display()))
-        }
+        Ok(to) if error.kind() == io::ErrorKind::NotFound => io::Error::new(
+            error.kind(),
+            format!("it is a link to {}, which is not there", to.display()),
+        ),
         _ => error,
     }
 }
@@ -258,10 +289,15 @@ fn nowhere(file: &Path, error: io::Error) -> io::Error {
 pub(crate) fn unpacked(file: &Path) -> Result<Vec<u8>, IdxError> {
     let stored = read_file(file)?;
     let mut content = Vec::new();
-    let read = reader(&stored).take(MAX_BYTES + 1).read_to_end(&mut content);
+    let read = reader(&stored)
+        .take(MAX_BYTES + 1)
+        .read_to_end(&mut content);
     let found = read.map_err(|error| unpacking(file, error))? as u64;
     match found > MAX_BYTES {
-        true => Err(IdxError::Large { file: file.to_path_buf(), found }),
+        true => Err(IdxError::Large {
+            file: file.to_path_buf(),
+            found,
+        }),
         false => Ok(content),
     }
 }
@@ -294,41 +330,80 @@ fn decode<const N: usize>(
     let broken = |error| unpacking(&file, error);
 
     let mut header = Vec::new();
-    content.by_ref().take(4).read_to_end(&mut header).map_err(broken)?;
+    content
+        .by_ref()
+        .take(4)
+        .read_to_end(&mut header)
+        .map_err(broken)?;
     let length = 4 + 4 * N;
     let Ok(magic) = <[u8; 4]>::try_from(header.as_slice()) else {
-        return Err(IdxError::Header { file, expected: length, found: header.len() });
+        return Err(IdxError::Header {
+            file,
+            expected: length,
+            found: header.len(),
+        });
     };
     let dimensions = N as u8;
     match magic {
         [0, 0, UNSIGNED_BYTE, found] if found == dimensions => {}
         [0, 0, UNSIGNED_BYTE, found] => {
-            return Err(IdxError::Dimensions { file, expected: dimensions, what, found });
+            return Err(IdxError::Dimensions {
+                file,
+                expected: dimensions,
+                what,
+                found,
+            });
         }
         found => {
-            return Err(IdxError::Magic { file, dimensions, what, found });
+            return Err(IdxError::Magic {
+                file,
+                dimensions,
+                what,
+                found,
+            });
         }
     }
-    content.by_ref().take(4 * N as u64).read_to_end(&mut header).map_err(broken)?;
+    content
+        .by_ref()
+        .take(4 * N as u64)
+        .read_to_end(&mut header)
+        .map_err(broken)?;
     if header.len() < length {
-        return Err(IdxError::Header { file, expected: length, found: header.len() });
+        return Err(IdxError::Header {
+            file,
+            expected: length,
+            found: header.len(),
+        });
     }
-    let sizes: Vec<u32> =
-        header[4..].as_chunks::<4>().0.iter().map(|bytes| u32::from_be_bytes(*bytes)).collect();
+    let sizes: Vec<u32> = header[4..]
+        .as_chunks::<4>()
+        .0
+        .iter()
+        .map(|bytes| u32::from_be_bytes(*bytes))
+        .collect();
     if sizes.contains(&0) {
         return Err(IdxError::Zero { file, sizes, axes });
     }
-    let product = sizes.iter().try_fold(1u64, |all, &size| all.checked_mul(u64::from(size)));
+    let product = sizes
+        .iter()
+        .try_fold(1u64, |all, &size| all.checked_mul(u64::from(size)));
     let Some(expected) = product.filter(|&bytes| bytes <= MAX_BYTES) else {
         return Err(IdxError::Absurd { file, sizes, axes });
     };
 
     // The vector grows with what is really there, so a false header costs nothing.
     let mut numbers = Vec::new();
-    content.take(expected + 1).read_to_end(&mut numbers).map_err(broken)?;
+    content
+        .take(expected + 1)
+        .read_to_end(&mut numbers)
+        .map_err(broken)?;
     let found = numbers.len() as u64;
     if found < expected {
-        return Err(IdxError::Short { file, expected, found });
+        return Err(IdxError::Short {
+            file,
+            expected,
+            found,
+        });
     }
     if found > expected {
         return Err(IdxError::Long { file, expected });
@@ -364,10 +439,17 @@ mod tests {
     fn error(bytes: &[u8]) -> IdxError {
         let file = stored(bytes);
         let error = read_images(file.path()).unwrap_err();
-        assert!(error.to_string().contains(file.path().to_str().unwrap()), "{error}");
+        assert!(
+            error.to_string().contains(file.path().to_str().unwrap()),
+            "{error}"
+        );
         let zipped = stored(&zip(bytes));
         let same = read_images(zipped.path()).unwrap_err();
-        assert_eq!(std::mem::discriminant(&error), std::mem::discriminant(&same), "{error} / {same}");
+        assert_eq!(
+            std::mem::discriminant(&error),
+            std::mem::discriminant(&same),
+            "{error} / {same}"
+        );
         error
     }
 
@@ -376,10 +458,18 @@ mod tests {
         let bytes = images([2, 1, 3], &[1, 2, 3, 4, 5, 6]);
         for file in [stored(&bytes), stored(&zip(&bytes))] {
             let read = read_images(file.path()).unwrap();
-            let expected = IdxImages { count: 2, height: 1, width: 3, pixels: vec![1, 2, 3, 4, 5, 6] };
+            let expected = IdxImages {
+                count: 2,
+                height: 1,
+                width: 3,
+                pixels: vec![1, 2, 3, 4, 5, 6],
+            };
             assert_eq!(read.content, expected);
             let on_disk = std::fs::read(file.path()).unwrap();
-            assert_eq!((read.bytes, read.sha256), (on_disk.len() as u64, sha256_hex(&on_disk)));
+            assert_eq!(
+                (read.bytes, read.sha256),
+                (on_disk.len() as u64, sha256_hex(&on_disk))
+            );
         }
         let labels = stored(&[header(&[3]).as_slice(), &[9, 0, 255]].concat());
         assert_eq!(read_labels(labels.path()).unwrap().content, [9, 0, 255]);
@@ -388,13 +478,43 @@ mod tests {
     #[test]
     fn a_file_must_hold_exactly_what_its_header_announces() {
         let short = error(&images([2, 2, 2], &[0; 7]));
-        assert!(matches!(short, IdxError::Short { expected: 8, found: 7, .. }), "{short}");
+        assert!(
+            matches!(
+                short,
+                IdxError::Short {
+                    expected: 8,
+                    found: 7,
+                    ..
+                }
+            ),
+            "{short}"
+        );
         let long = error(&images([2, 2, 2], &[0; 9]));
         assert!(matches!(long, IdxError::Long { expected: 8, .. }), "{long}");
         let header_only = error(&header(&[2, 2, 2])[..13]);
-        assert!(matches!(header_only, IdxError::Header { expected: 16, found: 13, .. }), "{header_only}");
+        assert!(
+            matches!(
+                header_only,
+                IdxError::Header {
+                    expected: 16,
+                    found: 13,
+                    ..
+                }
+            ),
+            "{header_only}"
+        );
         let three_bytes = error(&[0, 0, 8]);
-        assert!(matches!(three_bytes, IdxError::Header { expected: 16, found: 3, .. }), "{three_bytes}");
+        assert!(
+            matches!(
+                three_bytes,
+                IdxError::Header {
+                    expected: 16,
+                    found: 3,
+                    ..
+                }
+            ),
+            "{three_bytes}"
+        );
     }
 
     #[test]
@@ -405,7 +525,17 @@ mod tests {
         let floats = error(&[0, 0, 0x0d, 3, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0]);
         assert!(matches!(floats, IdxError::Magic { .. }), "{floats}");
         let labels = error(&[header(&[1]).as_slice(), &[7]].concat());
-        assert!(matches!(labels, IdxError::Dimensions { expected: 3, found: 1, .. }), "{labels}");
+        assert!(
+            matches!(
+                labels,
+                IdxError::Dimensions {
+                    expected: 3,
+                    found: 1,
+                    ..
+                }
+            ),
+            "{labels}"
+        );
     }
 
     #[test]
@@ -422,7 +552,12 @@ mod tests {
     #[test]
     fn transposed_images_have_their_rows_and_columns_exchanged() {
         let pixels: Vec<u8> = (0..12).collect();
-        let images = IdxImages { count: 2, height: 2, width: 3, pixels };
+        let images = IdxImages {
+            count: 2,
+            height: 2,
+            width: 3,
+            pixels,
+        };
         let turned = images.clone().transposed();
         assert_eq!((turned.count, turned.height, turned.width), (2, 3, 2));
         for index in 0..2 {
@@ -437,19 +572,39 @@ mod tests {
     fn a_pipe_is_refused_and_not_waited_for() {
         let folder = tempfile::tempdir().unwrap();
         let pipe = folder.path().join("train-images-idx3-ubyte");
-        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        assert!(
+            std::process::Command::new("mkfifo")
+                .arg(&pipe)
+                .status()
+                .unwrap()
+                .success()
+        );
         let error = read_images(&pipe).unwrap_err();
-        assert!(error.is_io() && error.to_string().contains("not a regular file"), "{error}");
+        assert!(
+            error.is_io() && error.to_string().contains("not a regular file"),
+            "{error}"
+        );
     }
 
     #[test]
     fn missing_files_and_broken_gzip_streams_name_the_file() {
         let missing = read_images(Path::new("no/such/train-images-idx3-ubyte")).unwrap_err();
-        assert!(missing.is_io() && missing.to_string().contains("no/such/train-images-idx3-ubyte"));
+        assert!(
+            missing.is_io()
+                && missing
+                    .to_string()
+                    .contains("no/such/train-images-idx3-ubyte")
+        );
         let whole = zip(&images([1, 2, 2], &[1, 2, 3, 4]));
         let cut = stored(&whole[..whole.len() - 6]);
-        assert!(matches!(read_images(cut.path()).unwrap_err(), IdxError::Gzip { .. }));
+        assert!(matches!(
+            read_images(cut.path()).unwrap_err(),
+            IdxError::Gzip { .. }
+        ));
         let appended = stored(&[whole.as_slice(), b"rest"].concat());
-        assert!(matches!(read_images(appended.path()).unwrap_err(), IdxError::Gzip { .. }));
+        assert!(matches!(
+            read_images(appended.path()).unwrap_err(),
+            IdxError::Gzip { .. }
+        ));
     }
 }

@@ -27,7 +27,11 @@ impl DatasetInfo {
         let size = |split: &SplitInfo| format!("{} × {}", split.height, split.width);
         let mut all = Vec::new();
         if size(train) != size(test) {
-            all.push(format!("train images have {} pixels, test images {}", size(train), size(test)));
+            all.push(format!(
+                "train images have {} pixels, test images {}",
+                size(train),
+                size(test)
+            ));
         }
         for (split, has, lacks) in [("test", train, test), ("train", test, train)] {
             let missing: Vec<String> = (has.per_class.keys())
@@ -35,7 +39,10 @@ impl DatasetInfo {
                 .map(u8::to_string)
                 .collect();
             if !missing.is_empty() {
-                all.push(format!("there are no {split} images of class {}", missing.join(", ")));
+                all.push(format!(
+                    "there are no {split} images of class {}",
+                    missing.join(", ")
+                ));
             }
         }
         all

@@ -32,8 +32,11 @@ type Point = [f64; 2];
 /// Writes one digit (0 … 9) with variations from the stream: 28 × 28, 0 paper, 255 ink.
 pub(crate) fn write(digit: u8, chance: &mut Stream) -> Grid<u8> {
     let variant = choose(DIGITS[usize::from(digit) % DIGITS.len()], chance);
-    let mut lines: Vec<Vec<Point>> =
-        variant.strokes.iter().map(|stroke| line(&displaced(stroke, chance))).collect();
+    let mut lines: Vec<Vec<Point>> = variant
+        .strokes
+        .iter()
+        .map(|stroke| line(&displaced(stroke, chance)))
+        .collect();
     warp(&mut lines, chance);
     tilt(&mut lines, digit, chance);
     let radius = (1.22 * libm::exp(0.2 * chance.normal())).clamp(0.75, 2.0);
@@ -55,7 +58,10 @@ fn choose<'a>(variants: &'a [Variant], chance: &mut Stream) -> &'a Variant {
 /// Moves every place of a stroke a little: no two hands close a loop at the same point.
 fn displaced(stroke: &[Place], chance: &mut Stream) -> Vec<Place> {
     let fresh = (1.0 - DRIFT * DRIFT).sqrt();
-    let mut drift = [PLACE_SPREAD * chance.normal(), PLACE_SPREAD * chance.normal()];
+    let mut drift = [
+        PLACE_SPREAD * chance.normal(),
+        PLACE_SPREAD * chance.normal(),
+    ];
     let moved = |place: &Place| {
         let [dx, dy] = drift;
         drift = drift.map(|d| DRIFT * d + fresh * PLACE_SPREAD * chance.normal());
@@ -80,8 +86,16 @@ fn line(places: &[Place]) -> Vec<Point> {
     for i in 0..points.len() - 1 {
         let (from, to) = (points[i], points[i + 1]);
         // Beyond an end or a turn, the neighbour is the mirror image of the one on this side.
-        let before = if i == 0 || turns(i) { mirror(to, from) } else { points[i - 1] };
-        let after = if i + 2 == points.len() || turns(i + 1) { mirror(from, to) } else { points[i + 2] };
+        let before = if i == 0 || turns(i) {
+            mirror(to, from)
+        } else {
+            points[i - 1]
+        };
+        let after = if i + 2 == points.len() || turns(i + 1) {
+            mirror(from, to)
+        } else {
+            points[i + 2]
+        };
         for piece in 1..=PIECES {
             let t = piece as f64 / PIECES as f64;
             line.push(std::array::from_fn(|axis| {
@@ -183,8 +197,12 @@ fn ink(lines: &[Vec<Point>], radius: f64, chance: &mut Stream) -> Grid<u8> {
 fn segment(cover: &mut Grid<f64>, from: Point, to: Point, radius: f64) {
     let reach = radius + 1.0;
     let range = |axis: usize| {
-        let low = (from[axis].min(to[axis]) - reach).floor().clamp(0.0, SIDE as f64) as usize;
-        let high = (from[axis].max(to[axis]) + reach).ceil().clamp(0.0, SIDE as f64) as usize;
+        let low = (from[axis].min(to[axis]) - reach)
+            .floor()
+            .clamp(0.0, SIDE as f64) as usize;
+        let high = (from[axis].max(to[axis]) + reach)
+            .ceil()
+            .clamp(0.0, SIDE as f64) as usize;
         low..high
     };
     let along = [to[0] - from[0], to[1] - from[1]];
@@ -192,7 +210,8 @@ fn segment(cover: &mut Grid<f64>, from: Point, to: Point, radius: f64) {
     for row in range(1) {
         for column in range(0) {
             let centre = [column as f64 + 0.5 - from[0], row as f64 + 0.5 - from[1]];
-            let t = ((centre[0] * along[0] + centre[1] * along[1]) / length_squared).clamp(0.0, 1.0);
+            let t =
+                ((centre[0] * along[0] + centre[1] * along[1]) / length_squared).clamp(0.0, 1.0);
             let (dx, dy) = (centre[0] - t * along[0], centre[1] - t * along[1]);
             let covered = (radius + 0.5 - (dx * dx + dy * dy).sqrt()).clamp(0.0, 1.0);
             let pixel = &mut cover[(row, column)];

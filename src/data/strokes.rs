@@ -28,7 +28,8 @@ const fn variant(weight: u32, strokes: &'static [&'static [Place]]) -> Variant {
 }
 
 /// The ways of writing each digit, 0 to 9.
-pub(crate) const DIGITS: [&[Variant]; 10] = [ZERO, ONE, TWO, THREE, FOUR, FIVE, SIX, SEVEN, EIGHT, NINE];
+pub(crate) const DIGITS: [&[Variant]; 10] =
+    [ZERO, ONE, TWO, THREE, FOUR, FIVE, SIX, SEVEN, EIGHT, NINE];
 
 #[rustfmt::skip]
 const ZERO: &[Variant] = &[

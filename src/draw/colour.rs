@@ -15,12 +15,18 @@ pub(crate) struct Colour {
 impl Colour {
     /// Creates an opaque colour.
     pub(crate) const fn new(red: u8, green: u8, blue: u8) -> Self {
-        Colour { rgb: [red, green, blue], opacity: 255 }
+        Colour {
+            rgb: [red, green, blue],
+            opacity: 255,
+        }
     }
 
     /// Returns this colour with another opacity.
     pub(crate) const fn with_opacity(self, opacity: u8) -> Self {
-        Colour { rgb: self.rgb, opacity }
+        Colour {
+            rgb: self.rgb,
+            opacity,
+        }
     }
 
     /// Returns the colour without its opacity, as `#rrggbb`.
@@ -124,7 +130,8 @@ pub(crate) fn shade(material: Material, area: f64) -> Colour {
     };
     // A NaN area counts as the area at rest.
     let t = if t.is_nan() { 0.0 } else { t.clamp(0.0, 1.0) };
-    let mix = |k: usize| (f64::from(from[k]) + t * (f64::from(to[k]) - f64::from(from[k]))).round() as u8;
+    let mix =
+        |k: usize| (f64::from(from[k]) + t * (f64::from(to[k]) - f64::from(from[k]))).round() as u8;
     Colour::new(mix(0), mix(1), mix(2))
 }
 
@@ -142,7 +149,10 @@ mod tests {
         for material in Material::ALL.into_iter().skip(1) {
             let areas = (0..=44).map(|i| 0.5 + 0.025 * f64::from(i));
             let levels: Vec<f64> = areas.map(|a| brightness(shade(material, a))).collect();
-            assert!(levels.windows(2).all(|w| w[0] < w[1]), "{material:?} {levels:?}");
+            assert!(
+                levels.windows(2).all(|w| w[0] < w[1]),
+                "{material:?} {levels:?}"
+            );
             // Clearly visible: small and large differ by at least a fifth of the whole scale.
             assert!(levels[levels.len() - 1] - levels[0] > 51.0, "{material:?}");
         }
@@ -151,9 +161,21 @@ mod tests {
     /// Matrices from linear red, green and blue to what viewers without one kind of cone perceive
     /// (Machado et al. 2009, severity 1): protanopia, deuteranopia, tritanopia.
     const BLIND: [[[f64; 3]; 3]; 3] = [
-        [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
-        [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
-        [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
+        [
+            [0.152286, 1.052583, -0.204868],
+            [0.114503, 0.786281, 0.099216],
+            [-0.003882, -0.048116, 1.051998],
+        ],
+        [
+            [0.367322, 0.860646, -0.227968],
+            [0.280085, 0.672501, 0.047413],
+            [-0.011820, 0.042940, 0.968881],
+        ],
+        [
+            [1.255528, -0.076749, -0.178779],
+            [-0.078411, 0.930809, 0.147602],
+            [0.004733, 0.691367, 0.303900],
+        ],
     ];
 
     fn times(matrix: &[[f64; 3]; 3], v: [f64; 3]) -> [f64; 3] {
@@ -164,7 +186,11 @@ mod tests {
     fn lab(colour: Colour, eyes: &[[f64; 3]; 3]) -> [f64; 3] {
         let linear = colour.rgb.map(|v| {
             let v = f64::from(v) / 255.0;
-            if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+            if v <= 0.04045 {
+                v / 12.92
+            } else {
+                ((v + 0.055) / 1.055).powf(2.4)
+            }
         });
         let seen = times(eyes, linear).map(|v| v.clamp(0.0, 1.0));
         let to_xyz = [
@@ -174,7 +200,11 @@ mod tests {
         ];
         let [x, y, z] = times(&to_xyz, seen);
         let f = |v: f64| {
-            if v > 216.0 / 24389.0 { v.cbrt() } else { (24389.0 / 27.0 * v + 16.0) / 116.0 }
+            if v > 216.0 / 24389.0 {
+                v.cbrt()
+            } else {
+                (24389.0 / 27.0 * v + 16.0) / 116.0
+            }
         };
         let (x, y, z) = (f(x / 0.95047), f(y), f(z / 1.08883));
         [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
@@ -189,7 +219,11 @@ mod tests {
         let hue = |a: f64, b: f64| b.atan2(a).to_degrees().rem_euclid(360.0);
         let (h1, h2) = (hue(a1, b1), hue(a2, b2));
         let is_gray = c1 * c2 == 0.0;
-        let dh = if is_gray { 0.0 } else { (h2 - h1 + 540.0).rem_euclid(360.0) - 180.0 };
+        let dh = if is_gray {
+            0.0
+        } else {
+            (h2 - h1 + 540.0).rem_euclid(360.0) - 180.0
+        };
         let mean_h = match is_gray {
             true => h1 + h2,
             false if (h1 - h2).abs() <= 180.0 => (h1 + h2) / 2.0,
@@ -199,7 +233,9 @@ mod tests {
         let dh = 2.0 * (c1 * c2).sqrt() * (dh / 2.0).to_radians().sin();
         let (l, c) = ((l1 + l2) / 2.0, (c1 + c2) / 2.0);
         let cos = |degrees: f64| degrees.to_radians().cos();
-        let t = 1.0 - 0.17 * cos(mean_h - 30.0) + 0.24 * cos(2.0 * mean_h) + 0.32 * cos(3.0 * mean_h + 6.0)
+        let t = 1.0 - 0.17 * cos(mean_h - 30.0)
+            + 0.24 * cos(2.0 * mean_h)
+            + 0.32 * cos(3.0 * mean_h + 6.0)
             - 0.2 * cos(4.0 * mean_h - 63.0);
         let sl = 1.0 + 0.015 * (l - 50.0).powi(2) / (20.0 + (l - 50.0).powi(2)).sqrt();
         let (sc, sh) = (1.0 + 0.045 * c, 1.0 + 0.015 * c * t);
@@ -217,7 +253,10 @@ mod tests {
             ([50.0, 2.5, 0.0], [73.0, 25.0, -18.0], 27.1492),
             ([2.0776, 0.0795, -1.135], [0.9033, -0.0636, -0.5514], 0.9082),
         ] {
-            assert!((difference(one, other) - expected).abs() < 1e-4, "{one:?} {other:?}");
+            assert!(
+                (difference(one, other) - expected).abs() < 1e-4,
+                "{one:?} {other:?}"
+            );
         }
     }
 
@@ -231,7 +270,8 @@ mod tests {
                     continue;
                 }
                 for eyes in &BLIND {
-                    let differences = shades(*one).flat_map(|a| shades(*other).map(move |b| (a, b)));
+                    let differences =
+                        shades(*one).flat_map(|a| shades(*other).map(move |b| (a, b)));
                     let least = differences
                         .map(|(a, b)| difference(lab(a, eyes), lab(b, eyes)))
                         .fold(f64::INFINITY, f64::min);
@@ -243,7 +283,9 @@ mod tests {
 
     #[test]
     fn a_mark_is_seen_on_every_shade_of_its_material() {
-        let marked = Material::ALL.into_iter().filter(|material| !mark(*material).is_empty());
+        let marked = Material::ALL
+            .into_iter()
+            .filter(|material| !mark(*material).is_empty());
         for material in marked {
             for k in 0..=22 {
                 let fill = shade(material, 0.5 + 0.05 * f64::from(k));

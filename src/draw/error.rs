@@ -23,7 +23,9 @@ pub enum PictureError {
         height: u32,
     },
     /// A figure would have no pixels or too many.
-    #[error("a figure of {width} × {height} pixels is not possible; expected 1 … 16000 on each side")]
+    #[error(
+        "a figure of {width} × {height} pixels is not possible; expected 1 … 16000 on each side"
+    )]
     Figure {
         /// The requested width, pixels.
         width: f64,
@@ -68,8 +70,10 @@ impl From<PictureError> for Error {
 /// # Errors
 /// [`PictureError::Write`] with the path.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), PictureError> {
-    crate::base::files::write_atomically(path, bytes)
-        .map_err(|source| PictureError::Write { path: path.to_path_buf(), source })
+    crate::base::files::write_atomically(path, bytes).map_err(|source| PictureError::Write {
+        path: path.to_path_buf(),
+        source,
+    })
 }
 
 #[cfg(test)]
@@ -84,7 +88,12 @@ mod tests {
         write_whole(&path, b"new").unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"new");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
-        let error = write_whole(&folder.path().join("none/picture"), b"").unwrap_err().to_string();
-        assert!(error.contains("none") && error.contains("folder"), "{error}");
+        let error = write_whole(&folder.path().join("none/picture"), b"")
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("none") && error.contains("folder"),
+            "{error}"
+        );
     }
 }

@@ -11,12 +11,14 @@ const REGULAR: &[u8] = include_bytes!("assets/DejaVuSansCondensed-subset.ttf");
 const BOLD: &[u8] = include_bytes!("assets/DejaVuSansCondensed-Bold-subset.ttf");
 
 /// The font families that the SVG of figures lists.
-pub(crate) const FAMILIES: &str = "'DejaVu Sans Condensed', Arial, Helvetica, 'Liberation Sans', sans-serif";
+pub(crate) const FAMILIES: &str =
+    "'DejaVu Sans Condensed', Arial, Helvetica, 'Liberation Sans', sans-serif";
 
 fn font(bold: bool) -> &'static Face<'static> {
     static FONTS: LazyLock<[Face; 2]> = LazyLock::new(|| {
-        [REGULAR, BOLD]
-            .map(|file| Face::parse(file, 0).expect("the embedded fonts are fonts: a test reads them"))
+        [REGULAR, BOLD].map(|file| {
+            Face::parse(file, 0).expect("the embedded fonts are fonts: a test reads them")
+        })
     });
     &FONTS[usize::from(bold)]
 }
@@ -34,7 +36,10 @@ fn advance(font: &Face, glyph: GlyphId) -> u16 {
 /// Returns the width of an unkerned text, points, at a font size; every family of figures fits it.
 pub(crate) fn width(text: &str, size: f64, bold: bool) -> f64 {
     let font = font(bold);
-    let units: u64 = text.chars().map(|letter| u64::from(advance(font, glyph(font, letter)))).sum();
+    let units: u64 = text
+        .chars()
+        .map(|letter| u64::from(advance(font, glyph(font, letter))))
+        .sum();
     // Font engines round sizes to 64ths.
     (64.0 * size).floor() / 64.0 * units as f64 / f64::from(font.units_per_em())
 }
@@ -43,7 +48,11 @@ pub(crate) fn width(text: &str, size: f64, bold: bool) -> f64 {
 pub(crate) fn letters(text: &str, size: f64, bold: bool) -> (Option<Path>, f32) {
     let font = font(bold);
     let scale = size as f32 / f32::from(font.units_per_em());
-    let mut outlines = Outlines { path: PathBuilder::new(), scale, x: 0.0 };
+    let mut outlines = Outlines {
+        path: PathBuilder::new(),
+        scale,
+        x: 0.0,
+    };
     let mut before = None;
     for letter in text.chars() {
         let glyph = glyph(font, letter);
@@ -59,13 +68,18 @@ pub(crate) fn letters(text: &str, size: f64, bold: bool) -> (Option<Path>, f32) 
 /// Returns the kerning of two letters, font units. The embedded fonts have one table of class
 /// pairs.
 fn kerning(font: &Face, before: GlyphId, glyph: GlyphId) -> i16 {
-    let table = font.tables().gpos.and_then(|gpos| gpos.lookups.get(0)?.subtables.get(0));
+    let table = font
+        .tables()
+        .gpos
+        .and_then(|gpos| gpos.lookups.get(0)?.subtables.get(0));
     match table {
-        Some(PositioningSubtable::Pair(PairAdjustment::Format2 { coverage, classes, matrix }))
-            if coverage.contains(before) =>
-        {
-            matrix.get((classes.0.get(before), classes.1.get(glyph))).map_or(0, |(first, _)| first.x_advance)
-        }
+        Some(PositioningSubtable::Pair(PairAdjustment::Format2 {
+            coverage,
+            classes,
+            matrix,
+        })) if coverage.contains(before) => matrix
+            .get((classes.0.get(before), classes.1.get(glyph)))
+            .map_or(0, |(first, _)| first.x_advance),
         _ => 0,
     }
 }
@@ -100,7 +114,8 @@ impl OutlineBuilder for Outlines {
     }
 
     fn curve_to(&mut self, ax: f32, ay: f32, bx: f32, by: f32, x: f32, y: f32) {
-        let ([ax, ay], [bx, by], [x, y]) = (self.place(ax, ay), self.place(bx, by), self.place(x, y));
+        let ([ax, ay], [bx, by], [x, y]) =
+            (self.place(ax, ay), self.place(bx, by), self.place(x, y));
         self.path.cubic_to(ax, ay, bx, by, x, y);
     }
 
@@ -131,7 +146,10 @@ pub(crate) fn lines(text: &str, size: f64, bold: bool, most: f64, count: usize) 
     let mut rest = text;
     while lines.len() + 1 < count && width(rest, size, bold) > most {
         let blanks = rest.match_indices(' ').map(|(at, _)| at);
-        let Some(end) = blanks.take_while(|at| width(&rest[..*at], size, bold) <= most).last() else {
+        let Some(end) = blanks
+            .take_while(|at| width(&rest[..*at], size, bold) <= most)
+            .last()
+        else {
             break;
         };
         lines.push(rest[..end].to_string());
@@ -162,7 +180,10 @@ mod tests {
             assert!(drawn + 2.0 < unkerned, "{pair}: {drawn} {unkerned}");
         }
         let bounds = drawn("漢").0.unwrap().bounds();
-        assert!(bounds.width() > 20.0 && bounds.height() > 40.0 && bounds.top() < -40.0, "{bounds:?}");
+        assert!(
+            bounds.width() > 20.0 && bounds.height() > 40.0 && bounds.top() < -40.0,
+            "{bounds:?}"
+        );
         assert_eq!(drawn(" ").0, None);
     }
 
@@ -170,7 +191,10 @@ mod tests {
     fn texts_are_cut_to_fit() {
         assert_eq!(fitted("short", 8.0, false, 100.0), "short");
         let cut = fitted("a very long name of a very long run", 8.0, false, 60.0);
-        assert!(cut.ends_with('…') && width(&cut, 8.0, false) <= 60.0 && cut.len() > 8, "{cut}");
+        assert!(
+            cut.ends_with('…') && width(&cut, 8.0, false) <= 60.0 && cut.len() > 8,
+            "{cut}"
+        );
         assert_eq!(fitted("x", 8.0, false, 0.0), "…");
         // Cutting takes no time, however long the text is.
         let endless = fitted(&"name ".repeat(1_000_000), 8.0, false, 60.0);
@@ -187,7 +211,10 @@ mod tests {
         assert_eq!(broken(500.0, 3), [text]);
         let three = broken(60.0, 3);
         assert_eq!((three.len(), three.join(" ").as_str()), (3, text));
-        assert!(three.iter().all(|line| width(line, 8.0, false) <= 60.0), "{three:?}");
+        assert!(
+            three.iter().all(|line| width(line, 8.0, false) <= 60.0),
+            "{three:?}"
+        );
         assert_eq!(broken(60.0, 9), three);
         assert!(broken(60.0, 2)[1].ends_with('…') && broken(60.0, 1)[0].ends_with('…'));
         // A single word that is too long is cut.

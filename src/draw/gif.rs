@@ -32,7 +32,13 @@ pub(crate) struct GifOptions {
 
 impl Default for GifOptions {
     fn default() -> Self {
-        GifOptions { width: 480, fps: 50.0, every: 1, look: Look::Plain, hold: 0.6 }
+        GifOptions {
+            width: 480,
+            fps: 50.0,
+            every: 1,
+            look: Look::Plain,
+            hold: 0.6,
+        }
     }
 }
 
@@ -48,7 +54,11 @@ const BATCH: usize = 32;
 /// # Errors
 /// Returns a [`PictureError`] if the recording cannot be drawn, the width is not possible or the
 /// file cannot be written.
-pub(crate) fn write(path: &Path, recording: &Recording, options: &GifOptions) -> Result<(), PictureError> {
+pub(crate) fn write(
+    path: &Path,
+    recording: &Recording,
+    options: &GifOptions,
+) -> Result<(), PictureError> {
     write_whole(path, &encode(recording, options)?)
 }
 
@@ -83,34 +93,56 @@ fn encoded(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, Pictu
     let failed = |e: ::gif::EncodingError| PictureError::Encode(e.to_string());
     let (width, height) = (stage.width as u16, stage.height as u16);
     let mut encoder = Encoder::new(Vec::new(), width, height, &colours).map_err(failed)?;
-    encoder.set_repeat(Repeat::Infinite).map_err(|e| PictureError::Encode(e.to_string()))?;
+    encoder
+        .set_repeat(Repeat::Infinite)
+        .map_err(|e| PictureError::Encode(e.to_string()))?;
     let centiseconds = |seconds: f64| {
-        if seconds > 0.0 { (100.0 * seconds).round().min(6e3) as u16 } else { 0 }
+        if seconds > 0.0 {
+            (100.0 * seconds).round().min(6e3) as u16
+        } else {
+            0
+        }
     };
     // Delays are whole hundredths of a second, rounded so that their sum stays correct.
     let until = |frame: usize| f64::from(centiseconds(1.0)) * frame as f64 / options.fps.max(0.1);
-    let delay = |frame: usize| ((until(frame + 1).round() - until(frame).round()).min(6e3) as u16).max(2);
+    let delay =
+        |frame: usize| ((until(frame + 1).round() - until(frame).round()).min(6e3) as u16).max(2);
     let hold = centiseconds(options.hold);
     let mut number = 0;
     let mut before: Vec<u8> = Vec::new();
     for batch in frames.chunks(BATCH) {
         // In parallel but in order, and only one batch in memory.
         let mut images = vec![before];
-        let batch_images: Vec<_> = batch.par_iter().map(|f| indexed(&walk, &stage, &palette, *f)).collect();
+        let batch_images: Vec<_> = batch
+            .par_iter()
+            .map(|f| indexed(&walk, &stage, &palette, *f))
+            .collect();
         for image in batch_images {
             images.push(image?);
         }
         let pairs: Vec<_> = images.windows(2).collect();
-        let encoded = pairs.par_iter().map(|p| difference(&p[0], &p[1], width, height, unchanged));
+        let encoded = pairs
+            .par_iter()
+            .map(|p| difference(&p[0], &p[1], width, height, unchanged));
         for (f, mut encoded) in batch.iter().zip(encoded.collect::<Vec<_>>()) {
             let is_last = f + 1 == walk.phase_frames(walk.phase_index(*f)).end;
-            encoded.delay = if is_last { delay(number).max(hold) } else { delay(number) };
+            encoded.delay = if is_last {
+                delay(number).max(hold)
+            } else {
+                delay(number)
+            };
             number += 1;
-            encoder.write_lzw_pre_encoded_frame(&encoded).map_err(failed)?;
+            encoder
+                .write_lzw_pre_encoded_frame(&encoded)
+                .map_err(failed)?;
         }
-        before = images.pop().expect("the image before the batch is among them");
+        before = images
+            .pop()
+            .expect("the image before the batch is among them");
     }
-    encoder.into_inner().map_err(|e| PictureError::Encode(e.to_string()))
+    encoder
+        .into_inner()
+        .map_err(|e| PictureError::Encode(e.to_string()))
 }
 
 /// Returns a single frame as a GIF, which is a third of the size of a PNG.
@@ -123,32 +155,67 @@ pub fn still(walk: &Walk, frame: usize, width: u32) -> Result<Vec<u8>, PictureEr
     let failed = |e: ::gif::EncodingError| PictureError::Encode(e.to_string());
     let (width, height) = (stage.width as u16, stage.height as u16);
     let buffer = indexed(walk, &stage, &palette, frame)?.into();
-    let mut encoder = Encoder::new(Vec::new(), width, height, &palette.colours().concat()).map_err(failed)?;
-    encoder.write_frame(&Frame { width, height, buffer, ..Frame::default() }).map_err(failed)?;
-    encoder.into_inner().map_err(|e| PictureError::Encode(e.to_string()))
+    let mut encoder =
+        Encoder::new(Vec::new(), width, height, &palette.colours().concat()).map_err(failed)?;
+    encoder
+        .write_frame(&Frame {
+            width,
+            height,
+            buffer,
+            ..Frame::default()
+        })
+        .map_err(failed)?;
+    encoder
+        .into_inner()
+        .map_err(|e| PictureError::Encode(e.to_string()))
 }
 
 fn palette(walk: &Walk, stage: &Stage, frames: &[usize]) -> Result<Palette, PictureError> {
-    let mut fixed: Vec<Colour> =
-        vec![colour::PAPER, colour::INK, colour::GROUND, colour::TRACE, colour::FAINT, colour::SEAM];
+    let mut fixed: Vec<Colour> = vec![
+        colour::PAPER,
+        colour::INK,
+        colour::GROUND,
+        colour::TRACE,
+        colour::FAINT,
+        colour::SEAM,
+    ];
     if stage.window(0).look == Look::Paper {
         fixed.extend([colour::GRID, colour::PEG]);
     }
     let [small, _, large] = colour::TONE_AREAS;
     for material in present(&walk.recording().body) {
         fixed.extend((0..SHADES).map(|k| {
-            colour::shade(material, small + (large - small) / f64::from(SHADES - 1) * f64::from(k))
+            colour::shade(
+                material,
+                small + (large - small) / f64::from(SHADES - 1) * f64::from(k),
+            )
         }));
     }
     let fixed: Vec<[u8; 3]> = fixed.into_iter().map(|c| c.rgb).collect();
-    let some: Vec<usize> = frames.iter().copied().step_by(frames.len().div_ceil(SAMPLES)).collect();
-    let pictures: Result<Vec<_>, _> = some.par_iter().map(|f| raster::picture(walk, *f, stage)).collect();
+    let some: Vec<usize> = frames
+        .iter()
+        .copied()
+        .step_by(frames.len().div_ceil(SAMPLES))
+        .collect();
+    let pictures: Result<Vec<_>, _> = some
+        .par_iter()
+        .map(|f| raster::picture(walk, *f, stage))
+        .collect();
     Ok(Palette::new(&fixed, pictures?.iter().map(|p| p.data())))
 }
 
-fn indexed(walk: &Walk, stage: &Stage, palette: &Palette, frame: usize) -> Result<Vec<u8>, PictureError> {
+fn indexed(
+    walk: &Walk,
+    stage: &Stage,
+    palette: &Palette,
+    frame: usize,
+) -> Result<Vec<u8>, PictureError> {
     let picture = raster::picture(walk, frame, stage)?;
-    Ok(picture.data().chunks_exact(4).map(|p| palette.index([p[0], p[1], p[2]])).collect())
+    Ok(picture
+        .data()
+        .chunks_exact(4)
+        .map(|p| palette.index([p[0], p[1], p[2]]))
+        .collect())
 }
 
 /// Compresses the difference of two images: the smallest rectangle that contains every change.
@@ -180,9 +247,17 @@ fn difference(before: &[u8], now: &[u8], width: u16, height: u16, unchanged: u8)
         frame.make_lzw_pre_encoded();
         frame
     };
-    let sparse = frame(rectangle().map(|i| if is_changed(i) { now[i] } else { unchanged }).collect());
+    let sparse = frame(
+        rectangle()
+            .map(|i| if is_changed(i) { now[i] } else { unchanged })
+            .collect(),
+    );
     let full = frame(rectangle().map(|i| now[i]).collect());
-    if full.buffer.len() < sparse.buffer.len() { full } else { sparse }
+    if full.buffer.len() < sparse.buffer.len() {
+        full
+    } else {
+        sparse
+    }
 }
 
 #[cfg(test)]
@@ -198,11 +273,17 @@ mod tests {
         let mut canvas = vec![0; usize::from(width) * usize::from(height) * 3];
         let mut frames = vec![];
         while let Some(frame) = decoder.read_next_frame().unwrap() {
-            for (i, index) in frame.buffer.iter().enumerate().filter(|(_, p)| Some(**p) != frame.transparent)
+            for (i, index) in frame
+                .buffer
+                .iter()
+                .enumerate()
+                .filter(|(_, p)| Some(**p) != frame.transparent)
             {
                 let (r, c) = (i / usize::from(frame.width), i % usize::from(frame.width));
-                let at = (usize::from(frame.top) + r) * usize::from(width) + usize::from(frame.left) + c;
-                canvas[3 * at..3 * at + 3].copy_from_slice(&palette[3 * usize::from(*index)..][..3]);
+                let at =
+                    (usize::from(frame.top) + r) * usize::from(width) + usize::from(frame.left) + c;
+                canvas[3 * at..3 * at + 3]
+                    .copy_from_slice(&palette[3 * usize::from(*index)..][..3]);
             }
             frames.push((canvas.clone(), frame.delay));
         }
@@ -213,11 +294,18 @@ mod tests {
     fn a_gif_decodes_to_the_rendered_frames_within_the_palette() {
         let recording = simulated("3344/1256/5612", 2, 30, true);
         let walk = Walk::new(&recording).unwrap();
-        let options = GifOptions { width: 320, every: 4, ..GifOptions::default() };
+        let options = GifOptions {
+            width: 320,
+            every: 4,
+            ..GifOptions::default()
+        };
         let stage = Stage::new(&walk, 320).unwrap().crisp();
         let (width, height, repeat, frames) = decode(&encode(&recording, &options).unwrap());
         let shown = shown(&walk, 4);
-        assert_eq!((u32::from(width), u32::from(height)), (stage.width, stage.height));
+        assert_eq!(
+            (u32::from(width), u32::from(height)),
+            (stage.width, stage.height)
+        );
         assert_eq!(repeat, Repeat::Infinite);
         assert_eq!(frames.len(), shown.len());
         for ((seen, _), f) in frames.iter().zip(&shown) {
@@ -226,12 +314,18 @@ mod tests {
             let pixels = full.data().chunks(4).zip(seen.chunks(3));
             let mut sum = 0.0;
             for (a, b) in pixels {
-                let error = (0..3).map(|k| (f64::from(a[k]) - f64::from(b[k])).abs()).fold(0.0, f64::max);
+                let error = (0..3)
+                    .map(|k| (f64::from(a[k]) - f64::from(b[k])).abs())
+                    .fold(0.0, f64::max);
                 sum += error;
                 far += usize::from(error > 24.0);
             }
             let count = seen.len() as f64 / 3.0;
-            assert!(sum / count < 2.0 && (far as f64) < 0.002 * count, "frame {f}: {} {far}", sum / count);
+            assert!(
+                sum / count < 2.0 && (far as f64) < 0.002 * count,
+                "frame {f}: {} {far}",
+                sum / count
+            );
         }
     }
 
@@ -241,12 +335,28 @@ mod tests {
         let walk = Walk::new(&recording).unwrap();
         assert_eq!(shown(&walk, 4), [0, 4, 8, 10, 11, 15, 19, 21]);
         assert_eq!(shown(&walk, 0).len(), 22);
-        let options = GifOptions { width: 320, every: 4, fps: 20.0, hold: 0.5, ..GifOptions::default() };
+        let options = GifOptions {
+            width: 320,
+            every: 4,
+            fps: 20.0,
+            hold: 0.5,
+            ..GifOptions::default()
+        };
         let (.., frames) = decode(&encode(&recording, &options).unwrap());
         let delays: Vec<u16> = frames.iter().map(|f| f.1).collect();
         assert_eq!(delays, [5, 5, 5, 50, 5, 5, 5, 50]);
-        let thirds = GifOptions { width: 320, every: 4, fps: 30.0, hold: 0.0, ..GifOptions::default() };
-        let delays: Vec<u16> = decode(&encode(&recording, &thirds).unwrap()).3.iter().map(|f| f.1).collect();
+        let thirds = GifOptions {
+            width: 320,
+            every: 4,
+            fps: 30.0,
+            hold: 0.0,
+            ..GifOptions::default()
+        };
+        let delays: Vec<u16> = decode(&encode(&recording, &thirds).unwrap())
+            .3
+            .iter()
+            .map(|f| f.1)
+            .collect();
         assert_eq!(delays[..6], [3, 4, 3, 3, 4, 3]);
     }
 
@@ -255,7 +365,12 @@ mod tests {
         let mut recording = simulated("1", 1, 2, false);
         recording.frames[1] = recording.frames[0].clone();
         recording.frames.truncate(2);
-        let options = GifOptions { width: 320, fps: f64::NAN, hold: f64::INFINITY, ..GifOptions::default() };
+        let options = GifOptions {
+            width: 320,
+            fps: f64::NAN,
+            hold: f64::INFINITY,
+            ..GifOptions::default()
+        };
         assert_eq!(decode(&encode(&recording, &options).unwrap()).3.len(), 2);
         recording.frames.truncate(1);
         assert_eq!(decode(&encode(&recording, &options).unwrap()).3.len(), 1);
@@ -268,7 +383,10 @@ mod tests {
             frame.points.iter_mut().for_each(|p| p[0] += shift);
             frame.centre[0] += shift;
         }
-        let options = GifOptions { every: 1, ..GifOptions::default() };
+        let options = GifOptions {
+            every: 1,
+            ..GifOptions::default()
+        };
         assert_eq!(decode(&encode(&recording, &options).unwrap()).3.len(), 4);
     }
 }

@@ -57,7 +57,12 @@ pub fn page(
     let walk = Walk::new(recording)?;
     let rollout = rollout(&walk, MOST_BYTES).to_string();
     // In a script element, only "<" can end it or open another.
-    Ok(filled(recording, title, metadata, &rollout.replace('<', "\\u003c")))
+    Ok(filled(
+        recording,
+        title,
+        metadata,
+        &rollout.replace('<', "\\u003c"),
+    ))
 }
 
 /// Returns a page as text, small enough for a notebook with many robots. It keeps some moments of
@@ -79,9 +84,18 @@ pub fn small_page(
 }
 
 /// Fills the template with a recording, as JSON or packed.
-fn filled(recording: &Recording, title: &str, metadata: &[(String, String)], rollout: &str) -> String {
+fn filled(
+    recording: &Recording,
+    title: &str,
+    metadata: &[(String, String)],
+    rollout: &str,
+) -> String {
     let rows = metadata.iter().map(|(key, value)| {
-        format!("<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n", escape(key), escape(value))
+        format!(
+            "<tr><th scope=\"row\">{}</th><td>{}</td></tr>\n",
+            escape(key),
+            escape(value)
+        )
     });
     let warning = if recording.unstable {
         "<p class=\"alarm\" role=\"alert\">The simulation became unstable and ended early.</p>"
@@ -107,7 +121,13 @@ pub(super) fn player(rollout: &str) -> String {
         TEMPLATE,
         &[
             ("title", ""),
-            ("style", concat!(include_str!("replay.css"), include_str!("report/player.css"))),
+            (
+                "style",
+                concat!(
+                    include_str!("replay.css"),
+                    include_str!("report/player.css")
+                ),
+            ),
             ("script", SCRIPT),
             ("metadata", ""),
             ("warning", ""),
@@ -144,23 +164,40 @@ fn packed_bytes(bytes: &[u8]) -> Result<String, PictureError> {
 fn differences(positions: &[i16], width: usize) -> Vec<u8> {
     let of_coordinate = |coordinate: usize| {
         let own = positions.iter().skip(coordinate).step_by(width.max(1));
-        own.scan(0_i16, |before, &now| Some(now.wrapping_sub(std::mem::replace(before, now))))
+        own.scan(0_i16, |before, &now| {
+            Some(now.wrapping_sub(std::mem::replace(before, now)))
+        })
     };
-    let words: Vec<[u8; 2]> = (0..width).flat_map(of_coordinate).map(i16::to_le_bytes).collect();
-    [0, 1].into_iter().flat_map(|byte| words.iter().map(move |word| word[byte])).collect()
+    let words: Vec<[u8; 2]> = (0..width)
+        .flat_map(of_coordinate)
+        .map(i16::to_le_bytes)
+        .collect();
+    [0, 1]
+        .into_iter()
+        .flat_map(|byte| words.iter().map(move |word| word[byte]))
+        .collect()
 }
 
 /// Returns the number of points that every frame has.
 fn points(recording: &Recording) -> usize {
-    recording.frames.iter().map(|f| f.points.len()).min().unwrap_or(0)
+    recording
+        .frames
+        .iter()
+        .map(|f| f.points.len())
+        .min()
+        .unwrap_or(0)
 }
 
 /// Returns the recording in the format of the page's script. Longer rollouts keep fewer frames, so
 /// that positions take at most `most` bytes.
 fn rollout(walk: &Walk, most: usize) -> Value {
-    let every = (walk.frames() * points(walk.recording()) * 4).div_ceil(most.max(1)).max(1);
+    let every = (walk.frames() * points(walk.recording()) * 4)
+        .div_ceil(most.max(1))
+        .max(1);
     let (mut rollout, positions) = moments(walk, every, STEPS);
-    rollout["positions"] = BASE64.encode(bytes(positions.into_iter().map(i16::to_le_bytes))).into();
+    rollout["positions"] = BASE64
+        .encode(bytes(positions.into_iter().map(i16::to_le_bytes)))
+        .into();
     rollout
 }
 
@@ -170,17 +207,27 @@ fn moments(walk: &Walk, every: usize, unit: f64) -> (Value, Vec<i16>) {
     let recording = walk.recording();
     let points = points(recording);
     let shown = gif::shown(walk, every);
-    let origins: Vec<[f64; 2]> =
-        shown.iter().map(|f| walk.centre(*f).map(|v| (v * STEPS).round() / STEPS)).collect();
+    let origins: Vec<[f64; 2]> = shown
+        .iter()
+        .map(|f| walk.centre(*f).map(|v| (v * STEPS).round() / STEPS))
+        .collect();
     let positions = shown.iter().zip(&origins).flat_map(|(f, origin)| {
-        recording.frames[*f].points.iter().take(points).flat_map(|p| in_steps(*p, *origin, unit))
+        recording.frames[*f]
+            .points
+            .iter()
+            .take(points)
+            .flat_map(|p| in_steps(*p, *origin, unit))
     });
     let positions = positions.collect();
     let phases = recording.phases.iter().enumerate().map(|(k, phase)| {
         let range = walk.phase_frames(k);
         let first = shown.partition_point(|f| *f < range.start);
-        let stimulus =
-            phase.seen.stimulus.rows().flatten().map(|v| (255.0 * v.clamp(0.0, 1.0)).round() as u8);
+        let stimulus = phase
+            .seen
+            .stimulus
+            .rows()
+            .flatten()
+            .map(|v| (255.0 * v.clamp(0.0, 1.0)).round() as u8);
         json!({
             "first": first,
             "label": phase.seen.label,
@@ -239,7 +286,11 @@ pub(crate) fn quantised(point: [f64; 2], origin: [f64; 2]) -> [i16; 2] {
 
 fn in_steps(point: [f64; 2], origin: [f64; 2], unit: f64) -> [i16; 2] {
     let steps = [0, 1].map(|k| ((point[k] - origin[k]) * unit).round());
-    if steps.iter().all(|s| s.abs() < 32767.0) { steps.map(|s| s as i16) } else { [NOWHERE; 2] }
+    if steps.iter().all(|s| s.abs() < 32767.0) {
+        steps.map(|s| s as i16)
+    } else {
+        [NOWHERE; 2]
+    }
 }
 
 /// Returns `None` for infinite values and NaN, which JSON lacks.
@@ -267,11 +318,17 @@ pub(super) fn escape(text: &str) -> String {
 pub(super) fn fill(template: &str, values: &[(&str, &str)]) -> String {
     let mut out = String::new();
     let mut rest = template;
-    while let Some((before, (name, after))) =
-        rest.split_once("{{").and_then(|(b, r)| Some((b, r.split_once("}}")?)))
+    while let Some((before, (name, after))) = rest
+        .split_once("{{")
+        .and_then(|(b, r)| Some((b, r.split_once("}}")?)))
     {
         out.push_str(before);
-        out.extend(values.iter().find(|(n, _)| *n == name).map(|(_, value)| *value));
+        out.extend(
+            values
+                .iter()
+                .find(|(n, _)| *n == name)
+                .map(|(_, value)| *value),
+        );
         rest = after;
     }
     out + rest
@@ -283,24 +340,32 @@ mod tests {
     use crate::draw::simulated;
 
     fn embedded(page: &str) -> Value {
-        let (_, rest) = page.split_once("<script type=\"application/json\" id=\"rollout\">").unwrap();
+        let (_, rest) = page
+            .split_once("<script type=\"application/json\" id=\"rollout\">")
+            .unwrap();
         serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()
     }
 
     /// Decodes the positions of every stored frame as the script does.
     fn positions(rollout: &Value) -> Vec<Vec<Option<[f64; 2]>>> {
         let data = |key: &str| BASE64.decode(rollout[key].as_str().unwrap()).unwrap();
-        let origins: Vec<f64> =
-            data("origins").chunks(8).map(|b| f64::from_le_bytes(b.try_into().unwrap())).collect();
-        let steps: Vec<i16> =
-            data("positions").chunks(2).map(|b| i16::from_le_bytes(b.try_into().unwrap())).collect();
+        let origins: Vec<f64> = data("origins")
+            .chunks(8)
+            .map(|b| f64::from_le_bytes(b.try_into().unwrap()))
+            .collect();
+        let steps: Vec<i16> = data("positions")
+            .chunks(2)
+            .map(|b| i16::from_le_bytes(b.try_into().unwrap()))
+            .collect();
         let points = rollout["points"].as_u64().unwrap() as usize;
         let frames = steps.chunks(2 * points).zip(origins.chunks(2));
         let position = |p: &[i16], o: &[f64]| {
             (p[0] != NOWHERE)
                 .then(|| [0, 1].map(|k| f64::from(p[k]) / rollout["unit"].as_f64().unwrap() + o[k]))
         };
-        frames.map(|(frame, o)| frame.chunks(2).map(|p| position(p, o)).collect()).collect()
+        frames
+            .map(|(frame, o)| frame.chunks(2).map(|p| position(p, o)).collect())
+            .collect()
     }
 
     #[test]
@@ -317,7 +382,10 @@ mod tests {
             for (frame, points) in recording.frames.iter().zip(&decoded) {
                 for (p, q) in frame.points.iter().zip(points) {
                     let q = q.unwrap();
-                    assert!((p[0] - q[0]).abs() < 0.005 && (p[1] - q[1]).abs() < 0.005, "{p:?} {q:?}");
+                    assert!(
+                        (p[0] - q[0]).abs() < 0.005 && (p[1] - q[1]).abs() < 0.005,
+                        "{p:?} {q:?}"
+                    );
                 }
             }
             assert_eq!(rollout["phases"][1]["first"], 41);
@@ -330,11 +398,21 @@ mod tests {
         let mut recording = simulated("34/56", 1, 5, false);
         recording.robot = "</script><script>alert(1)</script>".into();
         recording.phases[0].seen.label = "<script>".into();
-        let metadata = [("<b>".to_string(), "\"{{rollout}}\" & <script>x</script>".to_string())];
+        let metadata = [(
+            "<b>".to_string(),
+            "\"{{rollout}}\" & <script>x</script>".to_string(),
+        )];
         let page = page(&recording, "<script>alert('t')</script>", &metadata).unwrap();
-        for forbidden in
-            ["http://", "https://", "src=", "@import", "url(", "<link", "{{title", "{{rollout}}</"]
-        {
+        for forbidden in [
+            "http://",
+            "https://",
+            "src=",
+            "@import",
+            "url(",
+            "<link",
+            "{{title",
+            "{{rollout}}</",
+        ] {
             assert!(!page.contains(forbidden), "{forbidden}");
         }
         let scripts = TEMPLATE.matches("<script").count();
@@ -350,7 +428,11 @@ mod tests {
     #[test]
     fn unstable_rollouts_say_so_and_leave_out_what_is_nowhere() {
         let mut recording = simulated("34/56", 1, 5, false);
-        assert!(!page(&recording, "", &[]).unwrap().contains("became unstable"));
+        assert!(
+            !page(&recording, "", &[])
+                .unwrap()
+                .contains("became unstable")
+        );
         recording.unstable = true;
         recording.frames[5].points[0] = [f64::NAN, 1.0];
         recording.frames[5].points[1] = [1e200, 1.0];
@@ -372,11 +454,13 @@ mod tests {
         let unpacked = |text: &str| {
             let mut bytes = Vec::new();
             let packed = BASE64.decode(text).unwrap();
-            std::io::Read::read_to_end(&mut flate2::read::GzDecoder::new(&packed[..]), &mut bytes).unwrap();
+            std::io::Read::read_to_end(&mut flate2::read::GzDecoder::new(&packed[..]), &mut bytes)
+                .unwrap();
             bytes
         };
         let (_, rest) = page.split_once("id=\"rollout\">").unwrap();
-        let rollout: Value = serde_json::from_slice(&unpacked(rest.split_once('<').unwrap().0)).unwrap();
+        let rollout: Value =
+            serde_json::from_slice(&unpacked(rest.split_once('<').unwrap().0)).unwrap();
         let steps: Vec<usize> = serde_json::from_value(rollout["steps"].clone()).unwrap();
         assert_eq!((steps[1], steps.last()), (5, Some(&1001)));
         let bytes = unpacked(rollout["positions"].as_str().unwrap());
@@ -390,8 +474,11 @@ mod tests {
             }
             let walk = Walk::new(&recording).unwrap();
             let origin = walk.centre(*step).map(|v| (v * STEPS).round() / STEPS);
-            let expected: Vec<i16> =
-                recording.frames[*step].points.iter().flat_map(|p| in_steps(*p, origin, 50.0)).collect();
+            let expected: Vec<i16> = recording.frames[*step]
+                .points
+                .iter()
+                .flat_map(|p| in_steps(*p, origin, 50.0))
+                .collect();
             assert_eq!(at, expected, "moment {moment}");
         }
     }

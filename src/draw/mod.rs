@@ -38,13 +38,31 @@ pub(crate) fn simulated(
     let body: Body = body.parse().expect("tests name bodies");
     let image = |phase: usize| {
         let pixel = |row: usize, column: usize| {
-            if (row + column + phase).is_multiple_of(3) { 1.0 } else { 0.0 }
+            if (row + column + phase).is_multiple_of(3) {
+                1.0
+            } else {
+                0.0
+            }
         };
         let stimulus = Grid::from_fn(body.height(), body.width(), pixel);
         let label = format!("{} (train {})", phase % 2, 2 * phase + 1);
-        LabelledStimulus { class: (phase % 2) as u8, label, stimulus }
+        LabelledStimulus {
+            class: (phase % 2) as u8,
+            label,
+            stimulus,
+        }
     };
     let images: Vec<LabelledStimulus> = (0..phases).map(image).collect();
-    let protocol = Protocol { control_steps: steps, ..Protocol::default() };
-    record("ROBOT", &body, &Physics::default(), &protocol, fresh, &images)
+    let protocol = Protocol {
+        control_steps: steps,
+        ..Protocol::default()
+    };
+    record(
+        "ROBOT",
+        &body,
+        &Physics::default(),
+        &protocol,
+        fresh,
+        &images,
+    )
 }

@@ -28,7 +28,11 @@ impl Palette {
         let mut frequent: Vec<_> = counts.into_iter().collect();
         frequent.sort_by_key(|(colour, count)| (std::cmp::Reverse(*count), *colour));
         let mut colours: Vec<[u8; 3]> = Vec::new();
-        for colour in fixed.iter().copied().chain(frequent.into_iter().map(|(colour, _)| colour)) {
+        for colour in fixed
+            .iter()
+            .copied()
+            .chain(frequent.into_iter().map(|(colour, _)| colour))
+        {
             let is_new = colours.iter().all(|c| distance(*c, colour) >= NEAR * NEAR);
             if is_new && colours.len() < COLOURS {
                 colours.push(colour);
@@ -36,9 +40,14 @@ impl Palette {
         }
         let nearest = (0..1 << 18).map(|bin: i32| {
             let centre = [bin >> 12, bin >> 6, bin].map(|v| (((v & 63) << 2) + 2) as u8);
-            (0..colours.len()).min_by_key(|&i| distance(colours[i], centre)).unwrap_or(0) as u8
+            (0..colours.len())
+                .min_by_key(|&i| distance(colours[i], centre))
+                .unwrap_or(0) as u8
         });
-        Palette { nearest: nearest.collect(), colours }
+        Palette {
+            nearest: nearest.collect(),
+            colours,
+        }
     }
 
     /// Returns the index of the colour nearest to a pixel's red, green and blue.
@@ -54,7 +63,10 @@ impl Palette {
 }
 
 fn distance(a: [u8; 3], b: [u8; 3]) -> i32 {
-    a.iter().zip(b).map(|(a, b)| (i32::from(*a) - i32::from(b)).pow(2)).sum()
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (i32::from(*a) - i32::from(b)).pow(2))
+        .sum()
 }
 
 #[cfg(test)]
@@ -63,19 +75,29 @@ mod tests {
 
     #[test]
     fn fixed_colours_are_exact_and_frequent_ones_near() {
-        let samples: Vec<u8> = (0..4000u32).flat_map(|i| [(i % 250) as u8, (i / 50) as u8, 9, 255]).collect();
+        let samples: Vec<u8> = (0..4000u32)
+            .flat_map(|i| [(i % 250) as u8, (i / 50) as u8, 9, 255])
+            .collect();
         let fixed = [[255, 255, 255], [200, 10, 30]];
         let palette = Palette::new(&fixed, [samples.as_slice()]);
         assert!(palette.colours().len() <= 255);
         for colour in fixed {
-            assert_eq!(palette.colours()[usize::from(palette.index(colour))], colour);
+            assert_eq!(
+                palette.colours()[usize::from(palette.index(colour))],
+                colour
+            );
         }
-        let few: Vec<u8> = (0..40u8).flat_map(|i| [6 * i, 255 - 6 * i, 90, 255]).collect();
+        let few: Vec<u8> = (0..40u8)
+            .flat_map(|i| [6 * i, 255 - 6 * i, 90, 255])
+            .collect();
         let palette = Palette::new(&fixed, [few.as_slice()]);
         for pixel in few.chunks(4) {
             let colour = [pixel[0], pixel[1], pixel[2]];
             let found = palette.colours()[usize::from(palette.index(colour))];
-            assert!(distance(found, colour) <= (NEAR + 4) * (NEAR + 4), "{colour:?} {found:?}");
+            assert!(
+                distance(found, colour) <= (NEAR + 4) * (NEAR + 4),
+                "{colour:?} {found:?}"
+            );
         }
     }
 }

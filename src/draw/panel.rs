@@ -29,16 +29,29 @@ const BEFORE_UNIT: f64 = 5.0;
 /// Draws everything around the world at a frame.
 pub(crate) fn panel(walk: &Walk, frame: usize, stage: &Stage) -> Vec<Primitive> {
     let z = stage.zoom;
-    let mut out =
-        vec![Primitive::rectangle([0.0, 0.0], [f64::from(stage.width), stage.panel], colour::PAPER)];
+    let mut out = vec![Primitive::rectangle(
+        [0.0, 0.0],
+        [f64::from(stage.width), stage.panel],
+        colour::PAPER,
+    )];
     let side = stimulus(walk, frame, [MARGIN * z, MARGIN * z], z, &mut out);
-    let (words, mut end) = (MARGIN * z + side[0] + GAP * z, f64::from(stage.width) - MARGIN * z);
+    let (words, mut end) = (
+        MARGIN * z + side[0] + GAP * z,
+        f64::from(stage.width) - MARGIN * z,
+    );
     if stage.has_legend {
         end -= LEGEND * z;
         legend(walk, [end, MARGIN * z], z, &mut out);
         end -= GAP * z;
     }
-    readouts(walk, frame, [words, MARGIN * z], (end - words) / z, z, &mut out);
+    readouts(
+        walk,
+        frame,
+        [words, MARGIN * z],
+        (end - words) / z,
+        z,
+        &mut out,
+    );
     numbers(walk, frame, stage, &mut out);
     out
 }
@@ -49,12 +62,19 @@ pub(crate) fn least_width(walk: &Walk) -> f64 {
     let recording = walk.recording();
     let large = |text: &str| fonts::width(text, LARGE, true);
     let small = |text: &str| fonts::width(text, SMALL, false);
-    let farthest = (0..walk.frames()).map(|frame| walk.displacement(frame).abs()).fold(0.0, f64::max);
+    let farthest = (0..walk.frames())
+        .map(|frame| walk.displacement(frame).abs())
+        .fold(0.0, f64::max);
     let distance = large(&format!("← {}", signed(-farthest))) + BEFORE_UNIT + small(UNIT);
     let ends = (0..recording.phases.len()).map(|phase| walk.phase_frames(phase).end - 1);
-    let time = ends.map(|frame| readout(walk, frame).time).max_by_key(String::len).unwrap_or_default();
+    let time = ends
+        .map(|frame| readout(walk, frame).time)
+        .max_by_key(String::len)
+        .unwrap_or_default();
     let judge = recording.judge.as_ref();
-    let sides = judge.iter().flat_map(|j| [(f64::NEG_INFINITY, &j.left), (f64::INFINITY, &j.right)]);
+    let sides = judge
+        .iter()
+        .flat_map(|j| [(f64::NEG_INFINITY, &j.left), (f64::INFINITY, &j.right)]);
     let verdicts = sides.map(|(moved, classes)| {
         let class = classes.first().copied().unwrap_or_default();
         large(&answer::verdict(judge, moved, class, true))
@@ -81,7 +101,11 @@ pub(crate) fn readout(walk: &Walk, frame: usize) -> Caption {
     let frames = walk.phase_frames(walk.phase_index(frame));
     // A phase that continues into the next ends with the first frame of that phase.
     let goes_on = frames.end < walk.frames() && !walk.is_fresh(walk.phase_index(frame) + 1);
-    let last = if goes_on { frames.end } else { frames.end.saturating_sub(1) };
+    let last = if goes_on {
+        frames.end
+    } else {
+        frames.end.saturating_sub(1)
+    };
     let step = frame.saturating_sub(frames.start);
     let cycles = step as f64 / walk.recording().cycle.max(1) as f64;
     let d = walk.displacement(frame);
@@ -95,32 +119,59 @@ pub(crate) fn readout(walk: &Walk, frame: usize) -> Caption {
     let LabelledStimulus { class, label, .. } = &walk.phase(frame).seen;
     Caption {
         label: label.clone(),
-        time: format!("step {step}/{} · cycle {}", last - frames.start, number::fixed(cycles, 1)),
+        time: format!(
+            "step {step}/{} · cycle {}",
+            last - frames.start,
+            number::fixed(cycles, 1)
+        ),
         displacement: format!("{arrow} {}", signed(d)),
-        verdict: answer::verdict(walk.recording().judge.as_ref(), d, *class, frame + 1 >= frames.end),
+        verdict: answer::verdict(
+            walk.recording().judge.as_ref(),
+            d,
+            *class,
+            frame + 1 >= frames.end,
+        ),
     }
 }
 
 /// Formats a distance with its sign and two decimals, or shorter if it is huge.
 pub(crate) fn signed(distance: f64) -> String {
     let is_short = distance.abs() < 1e5;
-    let text = if is_short { number::signed(distance, 2) } else { format!("{distance:+.1e}") };
+    let text = if is_short {
+        number::signed(distance, 2)
+    } else {
+        format!("{distance:+.1e}")
+    };
     text.replace('-', "−")
 }
 
 /// Draws the stimulus, its sensor voxels framed in their colour. Returns its width and height.
-fn stimulus(walk: &Walk, frame: usize, [x, y]: [f64; 2], z: f64, out: &mut Vec<Primitive>) -> [f64; 2] {
+fn stimulus(
+    walk: &Walk,
+    frame: usize,
+    [x, y]: [f64; 2],
+    z: f64,
+    out: &mut Vec<Primitive>,
+) -> [f64; 2] {
     let image = &walk.phase(frame).seen.stimulus;
     let longest = image.height().max(image.width()) as f64;
     let cell = (STIMULUS * z / longest).floor().max(1.0);
     let size = [cell * image.width() as f64, cell * image.height() as f64];
-    let frame_line = Primitive::rectangle([x - z, y - z], [x + size[0] + z, y + size[1] + z], colour::INK);
+    let frame_line = Primitive::rectangle(
+        [x - z, y - z],
+        [x + size[0] + z, y + size[1] + z],
+        colour::INK,
+    );
     out.push(frame_line);
     let body = &walk.recording().body;
     for ((row, column), intensity) in image.iter() {
         let [left, top] = [x + cell * column as f64, y + cell * row as f64];
         let [right, bottom] = [left + cell, top + cell];
-        out.push(Primitive::rectangle([left, top], [right, bottom], Colour::gray(*intensity)));
+        out.push(Primitive::rectangle(
+            [left, top],
+            [right, bottom],
+            Colour::gray(*intensity),
+        ));
         let at = |dr: isize, dc: isize| body.at(row as isize + dr, column as isize + dc);
         let material = at(0, 0);
         if material.is_sensor() {
@@ -147,17 +198,34 @@ fn stimulus(walk: &Walk, frame: usize, [x, y]: [f64; 2], z: f64, out: &mut Vec<P
 
 /// Returns a colour brighter than the voxel, visible on black and on white.
 fn sensor_line(material: Material) -> Colour {
-    if material == Material::SensorShrink { Colour::new(240, 62, 82) } else { Colour::new(38, 186, 120) }
+    if material == Material::SensorShrink {
+        Colour::new(240, 62, 82)
+    } else {
+        Colour::new(38, 186, 120)
+    }
 }
 
 /// Draws the words, each line at most `room` wide \[pixels at zoom 1\].
-fn readouts(walk: &Walk, frame: usize, [x, y]: [f64; 2], room: f64, z: f64, out: &mut Vec<Primitive>) {
+fn readouts(
+    walk: &Walk,
+    frame: usize,
+    [x, y]: [f64; 2],
+    room: f64,
+    z: f64,
+    out: &mut Vec<Primitive>,
+) {
     let words = readout(walk, frame);
     let recording = walk.recording();
     let mut line = |[dx, dy]: [f64; 2], text: &str, size: f64, bold, colour| {
         let text = fonts::fitted(text, size, bold, room - dx);
         let wide = fonts::width(&text, size, bold);
-        out.push(Primitive::Text { text, at: [x + dx * z, y + dy * z], size: size * z, bold, colour });
+        out.push(Primitive::Text {
+            text,
+            at: [x + dx * z, y + dy * z],
+            size: size * z,
+            bold,
+            colour,
+        });
         dx + wide
     };
     line([0.0, 14.0], &words.label, LARGE, true, colour::INK);
@@ -175,7 +243,9 @@ fn readouts(walk: &Walk, frame: usize, [x, y]: [f64; 2], room: f64, z: f64, out:
 
 /// Returns the materials of a body.
 pub(crate) fn present(body: &Body) -> impl Iterator<Item = Material> {
-    Material::ALL.into_iter().filter(|m| !m.is_empty() && body.voxels().cells().contains(m))
+    Material::ALL
+        .into_iter()
+        .filter(|m| !m.is_empty() && body.voxels().cells().contains(m))
 }
 
 fn legend(walk: &Walk, [x, y]: [f64; 2], z: f64, out: &mut Vec<Primitive>) {
@@ -188,16 +258,30 @@ fn legend(walk: &Walk, [x, y]: [f64; 2], z: f64, out: &mut Vec<Primitive>) {
             (colour::tones(material)[1], high[0], high[1]),
             (colour::tones(material)[2], high[1], x + 17.0 * z),
         ] {
-            out.push(Primitive::rectangle([left, top], [right, low], Colour { rgb, opacity: 255 }));
+            out.push(Primitive::rectangle(
+                [left, top],
+                [right, low],
+                Colour { rgb, opacity: 255 },
+            ));
         }
         let [_, rgb, _] = colour::tones(material);
-        let corners = [[high[0], top], [high[1], top], [high[1], low], [high[0], low]];
+        let corners = [
+            [high[0], top],
+            [high[1], top],
+            [high[1], low],
+            [high[0], low],
+        ];
         let colour = colour::mark_colour(material, Colour { rgb, opacity: 255 });
-        out.extend(colour::mark(material).iter().map(|line| Primitive::Line {
-            points: line.iter().map(|point| colour::placed(*point, corners)).collect(),
-            width: z,
-            colour,
-            smooth: true,
+        out.extend(colour::mark(material).iter().map(|line| {
+            Primitive::Line {
+                points: line
+                    .iter()
+                    .map(|point| colour::placed(*point, corners))
+                    .collect(),
+                width: z,
+                colour,
+                smooth: true,
+            }
         }));
         out.push(Primitive::Text {
             text: material.name().to_string(),
@@ -213,16 +297,30 @@ fn numbers(walk: &Walk, frame: usize, stage: &Stage, out: &mut Vec<Primitive>) {
     let z = stage.zoom;
     let zero = walk.centre(walk.rollout(frame).start)[0];
     let window = stage.window(frame);
-    let step = if window.scale * 10.0 > 45.0 * z { 10.0 } else { 50.0 };
+    let step = if window.scale * 10.0 > 45.0 * z {
+        10.0
+    } else {
+        50.0
+    };
     for mark in ruler(&window, zero, step) {
         let at = stage.to_pixels(frame, [zero + mark, 0.0]);
-        let text = if mark == 0.0 { "0".into() } else { format!("{mark:+}").replace('-', "−") };
+        let text = if mark == 0.0 {
+            "0".into()
+        } else {
+            format!("{mark:+}").replace('-', "−")
+        };
         // The sign hangs over, so that the digits are centred under their tick.
         let size = SMALL * z;
         let digits = fonts::width(text.trim_start_matches(['+', '−']), size, false);
         let left = at[0] - digits / 2.0 - (fonts::width(&text, size, false) - digits);
         let at = [left.round(), at[1] + 18.0 * z];
-        out.push(Primitive::Text { text, at, size, bold: false, colour: colour::FAINT });
+        out.push(Primitive::Text {
+            text,
+            at,
+            size,
+            bold: false,
+            colour: colour::FAINT,
+        });
     }
 }
 
@@ -270,18 +368,30 @@ mod tests {
                 let stage = Stage::new(&walk, width).unwrap();
                 let all = panel(&walk, 50, &stage);
                 let texts = all.iter().filter_map(|primitive| match primitive {
-                    Primitive::Text { text, at, size, bold, .. } if at[1] < stage.panel => {
-                        Some((text.as_str(), at[0], at[0] + fonts::width(text, *size, *bold)))
-                    }
+                    Primitive::Text {
+                        text,
+                        at,
+                        size,
+                        bold,
+                        ..
+                    } if at[1] < stage.panel => Some((
+                        text.as_str(),
+                        at[0],
+                        at[0] + fonts::width(text, *size, *bold),
+                    )),
                     _ => None,
                 });
                 let is_of_legend = |text: &str| Material::ALL.iter().any(|m| m.name() == text);
-                let (legend, words): (Vec<_>, Vec<_>) = texts.partition(|(text, ..)| is_of_legend(text));
+                let (legend, words): (Vec<_>, Vec<_>) =
+                    texts.partition(|(text, ..)| is_of_legend(text));
                 let end = legend
                     .iter()
                     .map(|(_, left, _)| left - 22.0 * stage.zoom)
                     .fold(f64::from(width), f64::min);
-                assert!(words.iter().all(|(.., right)| *right < end), "{width}: {words:?} {end}");
+                assert!(
+                    words.iter().all(|(.., right)| *right < end),
+                    "{width}: {words:?} {end}"
+                );
                 let is_whole = words.iter().any(|(text, ..)| *text == verdict)
                     && words.iter().any(|(text, ..)| *text == UNIT);
                 assert!(is_whole || width < from, "{width}: {words:?}");
@@ -294,7 +404,10 @@ mod tests {
 
     #[test]
     fn distances_have_a_sign_and_never_a_negative_zero() {
-        assert_eq!([-3.456, -0.001, 2.0].map(signed), ["−3.46", "0.00", "+2.00"]);
+        assert_eq!(
+            [-3.456, -0.001, 2.0].map(signed),
+            ["−3.46", "0.00", "+2.00"]
+        );
         assert!(signed(-1.0e300).len() < 16 && signed(f64::NAN).len() < 16);
     }
 
@@ -306,9 +419,13 @@ mod tests {
             let mut out = vec![];
             stimulus(&walk, 0, [0.0, 0.0], 1.0, &mut out);
             let shrinks = sensor_line(Material::SensorShrink);
-            let line = |p: &&Primitive| matches!(p, Primitive::Quad { fill, .. } if *fill == shrinks);
+            let line =
+                |p: &&Primitive| matches!(p, Primitive::Quad { fill, .. } if *fill == shrinks);
             out.iter().filter(line).count()
         };
-        assert_eq!((frames("33/33"), frames("53/33"), frames("55/33")), (0, 4, 6));
+        assert_eq!(
+            (frames("33/33"), frames("53/33"), frames("55/33")),
+            (0, 4, 6)
+        );
     }
 }

@@ -22,8 +22,15 @@ pub(crate) fn picture(walk: &Walk, frame: usize, stage: &Stage) -> Result<Pixmap
     let mut pixmap = Pixmap::new(width, height).ok_or(PictureError::Size { width, height })?;
     pixmap.fill(tiny_skia::Color::WHITE);
     let world = scene::world(walk, frame, &stage.window(frame));
-    draw(&mut pixmap, &world, stage.zoom, |p| stage.to_pixels(frame, p));
-    draw(&mut pixmap, &panel::panel(walk, frame, stage), stage.zoom, |p| p);
+    draw(&mut pixmap, &world, stage.zoom, |p| {
+        stage.to_pixels(frame, p)
+    });
+    draw(
+        &mut pixmap,
+        &panel::panel(walk, frame, stage),
+        stage.zoom,
+        |p| p,
+    );
     Ok(pixmap)
 }
 
@@ -37,20 +44,41 @@ pub(crate) fn draw(
     let place = |point: &[f64; 2]| to_pixels(*point).map(|v| v.clamp(-BEYOND, BEYOND) as f32);
     for primitive in primitives {
         match primitive {
-            Primitive::Quad { corners, fill, smooth } => {
+            Primitive::Quad {
+                corners,
+                fill,
+                smooth,
+            } => {
                 if let Some(path) = polyline(corners.iter().map(place), true) {
                     let paint = paint(*fill, *smooth);
-                    pixmap.fill_path(&path, &paint, FillRule::Winding, Transform::identity(), None);
+                    pixmap.fill_path(
+                        &path,
+                        &paint,
+                        FillRule::Winding,
+                        Transform::identity(),
+                        None,
+                    );
                 }
             }
-            Primitive::Text { text, at, size, bold, colour } => {
+            Primitive::Text {
+                text,
+                at,
+                size,
+                bold,
+                colour,
+            } => {
                 if let (Some(path), _) = fonts::letters(text, *size, *bold) {
                     let [x, y] = place(at);
                     let (paint, there) = (paint(*colour, true), Transform::from_translate(x, y));
                     pixmap.fill_path(&path, &paint, FillRule::Winding, there, None);
                 }
             }
-            Primitive::Line { points, width, colour, smooth } => {
+            Primitive::Line {
+                points,
+                width,
+                colour,
+                smooth,
+            } => {
                 if let Some(path) = polyline(points.iter().map(place), false) {
                     let stroke = Stroke {
                         width: (width * zoom) as f32,
@@ -58,7 +86,13 @@ pub(crate) fn draw(
                         line_join: LineJoin::Round,
                         ..Stroke::default()
                     };
-                    pixmap.stroke_path(&path, &paint(*colour, *smooth), &stroke, Transform::identity(), None);
+                    pixmap.stroke_path(
+                        &path,
+                        &paint(*colour, *smooth),
+                        &stroke,
+                        Transform::identity(),
+                        None,
+                    );
                 }
             }
         }
@@ -68,7 +102,11 @@ pub(crate) fn draw(
 fn polyline(points: impl Iterator<Item = [f32; 2]>, closed: bool) -> Option<tiny_skia::Path> {
     let mut builder = PathBuilder::new();
     for (k, [x, y]) in points.enumerate() {
-        if k == 0 { builder.move_to(x, y) } else { builder.line_to(x, y) }
+        if k == 0 {
+            builder.move_to(x, y)
+        } else {
+            builder.line_to(x, y)
+        }
     }
     if closed {
         builder.close();
@@ -78,7 +116,10 @@ fn polyline(points: impl Iterator<Item = [f32; 2]>, closed: bool) -> Option<tiny
 
 /// Returns the paint for a colour.
 pub(crate) fn paint(colour: Colour, smooth: bool) -> Paint<'static> {
-    let mut paint = Paint { anti_alias: smooth, ..Paint::default() };
+    let mut paint = Paint {
+        anti_alias: smooth,
+        ..Paint::default()
+    };
     let [r, g, b] = colour.rgb;
     paint.set_color_rgba8(r, g, b, colour.opacity);
     paint
@@ -89,7 +130,9 @@ pub(crate) fn paint(colour: Colour, smooth: bool) -> Paint<'static> {
 /// # Errors
 /// Returns [`PictureError::Encode`] or [`PictureError::Write`].
 pub(crate) fn write_png(path: &Path, picture: &Pixmap) -> Result<(), PictureError> {
-    let bytes = picture.encode_png().map_err(|e| PictureError::Encode(e.to_string()))?;
+    let bytes = picture
+        .encode_png()
+        .map_err(|e| PictureError::Encode(e.to_string()))?;
     write_whole(path, &bytes)
 }
 
@@ -112,7 +155,10 @@ mod tests {
         let mut seen = 0;
         for (material, quad) in walk.voxels(10) {
             // Off the middle, so that the path of the centre of mass does not cover it.
-            let at = [0.7 * quad[0][0] + 0.3 * quad[1][0], 0.7 * quad[0][1] + 0.3 * quad[2][1]];
+            let at = [
+                0.7 * quad[0][0] + 0.3 * quad[1][0],
+                0.7 * quad[0][1] + 0.3 * quad[2][1],
+            ];
             let expected = colour::shade(material, crate::draw::walk::area(&quad)).rgb;
             seen += usize::from(pixel(&picture, stage.to_pixels(10, at)) == expected);
         }

@@ -29,7 +29,9 @@ impl fmt::Display for Look {
 impl FromStr for Look {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
-        let found = [Look::Plain, Look::Paper].into_iter().find(|look| look.to_string() == text);
+        let found = [Look::Plain, Look::Paper]
+            .into_iter()
+            .find(|look| look.to_string() == text);
         found.ok_or_else(|| "expected plain or paper".to_string())
     }
 }
@@ -81,12 +83,21 @@ const MARK_PIXELS: f64 = 4.0;
 impl Primitive {
     /// Creates a filled axis-parallel rectangle between two opposite corners.
     pub(crate) fn rectangle(a: [f64; 2], b: [f64; 2], fill: Colour) -> Self {
-        Primitive::Quad { corners: [a, [b[0], a[1]], b, [a[0], b[1]]], fill, smooth: false }
+        Primitive::Quad {
+            corners: [a, [b[0], a[1]], b, [a[0], b[1]]],
+            fill,
+            smooth: false,
+        }
     }
 
     /// Creates a line between two points.
     pub(crate) fn line(from: [f64; 2], to: [f64; 2], width: f64, colour: Colour) -> Self {
-        Primitive::Line { points: vec![from, to], width, colour, smooth: true }
+        Primitive::Line {
+            points: vec![from, to],
+            width,
+            colour,
+            smooth: true,
+        }
     }
 }
 
@@ -137,7 +148,14 @@ pub(crate) fn world(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive
 }
 
 fn ground(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
-    let Window { left, right, bottom, top, scale, .. } = *window;
+    let Window {
+        left,
+        right,
+        bottom,
+        top,
+        scale,
+        ..
+    } = *window;
     let mut out = vec![
         Primitive::rectangle([left, top], [right, bottom], colour::PAPER),
         Primitive::rectangle([left, 0.0], [right, bottom], colour::GROUND),
@@ -149,14 +167,24 @@ fn ground(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
     for (step, depth, line) in [(1.0, 3.0, 1.0), (10.0, 7.0, 1.5)] {
         // Ticks closer than four pixels would merge into a gray band.
         if step * scale >= 4.0 {
-            let tick = |at| Primitive::line([at, 0.0], [at, -depth / scale], line, colour::GROUND_LINE);
+            let tick =
+                |at| Primitive::line([at, 0.0], [at, -depth / scale], line, colour::GROUND_LINE);
             out.extend(ruler(window, zero, step).map(|mark| tick(zero + mark)));
         }
     }
-    out.push(Primitive::line([left, 0.0], [right, 0.0], 1.5, colour::GROUND_LINE));
+    out.push(Primitive::line(
+        [left, 0.0],
+        [right, 0.0],
+        1.5,
+        colour::GROUND_LINE,
+    ));
     // Marks the start of the rollout and of a continued phase: dashes of five pixels, five apart.
     let phase = walk.centre(walk.phase(frame).first_frame)[0];
-    for x in if phase == zero { vec![zero] } else { vec![zero, phase] } {
+    for x in if phase == zero {
+        vec![zero]
+    } else {
+        vec![zero, phase]
+    } {
         let dash = 5.0 / scale;
         let count = (top / (2.0 * dash)).clamp(0.0, 1e3) as u32;
         let dashes = (0..count).map(|k| 2.0 * dash * f64::from(k));
@@ -167,13 +195,32 @@ fn ground(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
 
 /// Draws the world's columns and rows, and the visible upper part of the ground's voxels.
 fn grid(window: &Window, out: &mut Vec<Primitive>) {
-    let Window { left, right, top, scale, .. } = *window;
-    let line = |points| Primitive::Line { points, width: 1.0, colour: colour::GRID, smooth: false };
+    let Window {
+        left,
+        right,
+        top,
+        scale,
+        ..
+    } = *window;
+    let line = |points| Primitive::Line {
+        points,
+        width: 1.0,
+        colour: colour::GRID,
+        smooth: false,
+    };
     // Lines closer than five pixels would merge into a gray veil; then every second, every fifth …
-    let step = [1.0, 2.0, 5.0, 10.0].into_iter().find(|step| step * scale >= 5.0).unwrap_or(20.0);
+    let step = [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .find(|step| step * scale >= 5.0)
+        .unwrap_or(20.0);
     out.extend(ruler(window, 0.0, step).map(|x| line(vec![[x, 0.0], [x, top]])));
     let rows = (top / step).clamp(0.0, 1e3) as u32;
-    out.extend((1..=rows).map(|k| line(vec![[left, step * f64::from(k)], [right, step * f64::from(k)]])));
+    out.extend((1..=rows).map(|k| {
+        line(vec![
+            [left, step * f64::from(k)],
+            [right, step * f64::from(k)],
+        ])
+    }));
     let depth = (8.0 / scale).min(1.0);
     let gap = (0.5 / scale).max(0.05);
     let peg = |x: f64| Primitive::rectangle([x + gap, 0.0], [x + step - gap, -depth], colour::PEG);
@@ -183,10 +230,17 @@ fn grid(window: &Window, out: &mut Vec<Primitive>) {
 
 fn body(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
     let smooth = !window.crisp;
-    let voxels = || walk.voxels(frame).filter(|(_, corners)| window.shows(corners));
+    let voxels = || {
+        walk.voxels(frame)
+            .filter(|(_, corners)| window.shows(corners))
+    };
     let quad = |(material, corners)| {
         let fill = colour::shade(material, area(&corners));
-        Primitive::Quad { corners, fill, smooth }
+        Primitive::Quad {
+            corners,
+            fill,
+            smooth,
+        }
     };
     let mut out: Vec<Primitive> = voxels().map(quad).collect();
     // The paper's pictures have no marks.
@@ -207,7 +261,11 @@ fn body(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
             colour::mark(material).iter().map(line)
         }));
     }
-    let seam = if window.crisp { colour::SEAM } else { colour::PAPER.with_opacity(120) };
+    let seam = if window.crisp {
+        colour::SEAM
+    } else {
+        colour::PAPER.with_opacity(120)
+    };
     // At small scales the lines would hide the voxels.
     if window.scale >= 5.0 {
         let seams = walk.seams(frame).filter(|side| window.shows(side));
@@ -235,8 +293,16 @@ fn path(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
     let points: Vec<[f64; 2]> = rollout.map(|f| walk.centre(f)).collect();
     let mut out = Vec::new();
     // Splits the path where it leaves the window: a long walk costs no more than a short one.
-    for piece in points.chunk_by(|a, b| window.shows(&[*a, *b])).filter(|piece| piece.len() > 1) {
-        let line = |width, colour| Primitive::Line { points: piece.to_vec(), width, colour, smooth: true };
+    for piece in points
+        .chunk_by(|a, b| window.shows(&[*a, *b]))
+        .filter(|piece| piece.len() > 1)
+    {
+        let line = |width, colour| Primitive::Line {
+            points: piece.to_vec(),
+            width,
+            colour,
+            smooth: true,
+        };
         out.push(line(3.4, colour::PAPER.with_opacity(170)));
         out.push(line(1.6, colour::TRACE));
     }
@@ -244,7 +310,11 @@ fn path(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
         for (half, fill) in [(4.0, colour::PAPER), (3.0, colour::TRACE)] {
             let h = half / window.scale;
             let corners = [[*x, y + h], [x + h, *y], [*x, y - h], [x - h, *y]];
-            out.push(Primitive::Quad { corners, fill, smooth: true });
+            out.push(Primitive::Quad {
+                corners,
+                fill,
+                smooth: true,
+            });
         }
     }
     out
@@ -272,9 +342,20 @@ mod tests {
         let scene = world(&walk, 20, &WINDOW);
         for (material, corners) in walk.voxels(20) {
             let fill = colour::shade(material, area(&corners));
-            assert!(scene.contains(&Primitive::Quad { corners, fill, smooth: true }), "{material:?}");
+            assert!(
+                scene.contains(&Primitive::Quad {
+                    corners,
+                    fill,
+                    smooth: true
+                }),
+                "{material:?}"
+            );
         }
-        let elsewhere = Window { left: 100.0, right: 130.0, ..WINDOW };
+        let elsewhere = Window {
+            left: 100.0,
+            right: 130.0,
+            ..WINDOW
+        };
         assert!(body(&walk, 20, &elsewhere).is_empty());
     }
 
@@ -282,9 +363,17 @@ mod tests {
     fn the_ruler_counts_from_the_start_and_survives_any_window() {
         let marks: Vec<f64> = ruler(&WINDOW, 0.5, 10.0).collect();
         assert_eq!(marks, [-10.0, 0.0, 10.0]);
-        let far = Window { left: 1e6, right: 1e6 + 30.0, ..WINDOW };
+        let far = Window {
+            left: 1e6,
+            right: 1e6 + 30.0,
+            ..WINDOW
+        };
         assert_eq!(ruler(&far, 0.0, 10.0).count(), 4);
-        let broken = Window { left: f64::NAN, right: f64::INFINITY, ..WINDOW };
+        let broken = Window {
+            left: f64::NAN,
+            right: f64::INFINITY,
+            ..WINDOW
+        };
         assert!(ruler(&broken, 0.0, 1.0).count() <= 10_000);
     }
 
@@ -293,12 +382,22 @@ mod tests {
         let recording = simulated("34/56", 1, 4, false);
         let walk = Walk::new(&recording).unwrap();
         let pegs = |window: &Window| {
-            let is_peg = |p: &&Primitive| matches!(p, Primitive::Quad { fill, .. } if *fill == colour::PEG);
+            let is_peg =
+                |p: &&Primitive| matches!(p, Primitive::Quad { fill, .. } if *fill == colour::PEG);
             ground(&walk, 2, window).iter().filter(is_peg).count()
         };
-        let paper = Window { look: Look::Paper, ..WINDOW };
+        let paper = Window {
+            look: Look::Paper,
+            ..WINDOW
+        };
         assert_eq!((pegs(&WINDOW), pegs(&paper)), (0, 32));
-        assert!(pegs(&Window { left: f64::NAN, right: f64::INFINITY, ..paper }) <= 10_001);
+        assert!(
+            pegs(&Window {
+                left: f64::NAN,
+                right: f64::INFINITY,
+                ..paper
+            }) <= 10_001
+        );
         assert_eq!("paper".parse(), Ok(Look::Paper));
         assert!("pretty".parse::<Look>().is_err());
     }
@@ -316,6 +415,9 @@ mod tests {
                 })
                 .max()
         };
-        assert_eq!((lengths(30), lengths(31), lengths(33)), (Some(31), None, Some(3)));
+        assert_eq!(
+            (lengths(30), lengths(31), lengths(33)),
+            (Some(31), None, Some(3))
+        );
     }
 }

@@ -60,18 +60,32 @@ pub(crate) enum SheetError {
 /// # Errors
 /// Returns [`SheetError::Size`] if the sheet would be empty or too large, or
 /// [`SheetError::Dataset`] if an image is not available.
-pub(crate) fn contact_sheet(dataset: &Dataset, split: Split, samples: usize) -> Result<Grid<u8>, SheetError> {
+pub(crate) fn contact_sheet(
+    dataset: &Dataset,
+    split: Split,
+    samples: usize,
+) -> Result<Grid<u8>, SheetError> {
     let classes = dataset.classes(split);
     let [rows, columns] = dataset.size(split).map_or([0, 0], shown);
     let [tall, wide] = [rows + GAP, columns + GAP];
     let side = |count: usize, size: usize| count.saturating_mul(size).saturating_add(GAP);
     let (height, width) = (side(classes.len(), tall), side(samples, wide));
     if classes.is_empty() || samples == 0 || height.max(width) > MAX_SIDE {
-        return Err(SheetError::Size { classes: classes.len(), samples, height, width });
+        return Err(SheetError::Size {
+            classes: classes.len(),
+            samples,
+            height,
+            width,
+        });
     }
     let mut sheet = Grid::filled(height, width, PAPER);
     for (row, &class) in classes.iter().enumerate() {
-        for (column, &index) in dataset.indices_of(split, class).iter().take(samples).enumerate() {
+        for (column, &index) in dataset
+            .indices_of(split, class)
+            .iter()
+            .take(samples)
+            .enumerate()
+        {
             let image = dataset.image(split, index)?;
             for ((r, c), &grey) in averaged(&image, rows, columns).iter() {
                 sheet[(GAP + row * tall + r, GAP + column * wide + c)] = grey.round() as u8;
@@ -96,15 +110,26 @@ fn shown([height, width]: [usize; 2]) -> [usize; 2] {
 /// Returns [`SheetError::Write`] if the file cannot be written.
 pub(crate) fn write_png(file: &Path, picture: &Grid<u8>) -> Result<(), SheetError> {
     let bytes = png(picture)?;
-    write_atomically(file, &bytes).map_err(|source| SheetError::Write { file: file.to_path_buf(), source })
+    write_atomically(file, &bytes).map_err(|source| SheetError::Write {
+        file: file.to_path_buf(),
+        source,
+    })
 }
 
 fn png(picture: &Grid<u8>) -> Result<Vec<u8>, SheetError> {
     let error = |what: &dyn std::fmt::Display| SheetError::Png(what.to_string());
-    let size = u32::try_from(picture.width()).ok().zip(u32::try_from(picture.height()).ok());
+    let size = u32::try_from(picture.width())
+        .ok()
+        .zip(u32::try_from(picture.height()).ok());
     let size = size.and_then(|(width, height)| IntSize::from_wh(width, height));
-    let rgba = picture.cells().iter().flat_map(|&grey| [grey, grey, grey, 255]).collect();
-    let pixmap = size.and_then(|size| Pixmap::from_vec(rgba, size)).ok_or_else(|| error(&"too large"))?;
+    let rgba = picture
+        .cells()
+        .iter()
+        .flat_map(|&grey| [grey, grey, grey, 255])
+        .collect();
+    let pixmap = size
+        .and_then(|size| Pixmap::from_vec(rgba, size))
+        .ok_or_else(|| error(&"too large"))?;
     pixmap.encode_png().map_err(|e| error(&e))
 }
 
@@ -117,13 +142,20 @@ mod tests {
 
     #[test]
     fn a_sheet_has_a_row_per_class_and_a_column_per_sample() {
-        let digits = BuiltinDigits { classes: vec![7, 2], ..BuiltinDigits::default() };
+        let digits = BuiltinDigits {
+            classes: vec![7, 2],
+            ..BuiltinDigits::default()
+        };
         let data = Dataset::builtin(digits, &[Split::Test]).unwrap();
         let sheet = contact_sheet(&data, Split::Test, 3).unwrap();
         assert_eq!((sheet.height(), sheet.width()), (2 * 88 + 4, 3 * 88 + 4));
         // Rows are in ascending order of class: the sevens, at even indices, come second.
         let image = data.image(Split::Test, 4).unwrap();
-        assert!(image.iter().all(|((r, c), &v)| sheet[(92 + 3 * r, 180 + 3 * c)] == v));
+        assert!(
+            image
+                .iter()
+                .all(|((r, c), &v)| sheet[(92 + 3 * r, 180 + 3 * c)] == v)
+        );
         assert_eq!(sheet[(0, 0)], PAPER);
     }
 
@@ -136,26 +168,48 @@ mod tests {
         assert_eq!(shown([1, 784]), [3, 256]);
         let folder = tempfile::tempdir().unwrap();
         let write = |name: &str, sizes: &[u32], values: Vec<u8>| {
-            std::fs::write(folder.path().join(name), [idx::header(sizes), values].concat()).unwrap();
+            std::fs::write(
+                folder.path().join(name),
+                [idx::header(sizes), values].concat(),
+            )
+            .unwrap();
         };
         // White on the left, black on the right.
-        let image: Vec<u8> = (0..600 * 800).map(|i| if i % 800 < 400 { 255 } else { 0 }).collect();
+        let image: Vec<u8> = (0..600 * 800)
+            .map(|i| if i % 800 < 400 { 255 } else { 0 })
+            .collect();
         write("train-images-idx3-ubyte", &[2, 600, 800], image.repeat(2));
         write("train-labels-idx1-ubyte", &[2], vec![0, 9]);
-        let data = Dataset::load("own", &places(Some(folder.path()), None, None), &[Split::Train]).unwrap();
+        let data = Dataset::load(
+            "own",
+            &places(Some(folder.path()), None, None),
+            &[Split::Train],
+        )
+        .unwrap();
         let sheet = contact_sheet(&data, Split::Train, 16).unwrap();
         assert_eq!((sheet.height(), sheet.width()), (2 * 196 + 4, 16 * 260 + 4));
         assert_eq!([sheet[(100, 4 + 127)], sheet[(100, 4 + 128)]], [255, 0]);
-        let error = contact_sheet(&data, Split::Train, 100).unwrap_err().to_string();
+        let error = contact_sheet(&data, Split::Train, 100)
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("found 396 × 26004"), "{error}");
     }
 
     #[test]
     fn sheets_of_no_sensible_size_are_refused() {
         let data = Dataset::load("builtin", &[], &[Split::Train]).unwrap();
-        assert!(matches!(contact_sheet(&data, Split::Train, 0), Err(SheetError::Size { .. })));
-        assert!(matches!(contact_sheet(&data, Split::Train, usize::MAX), Err(SheetError::Size { .. })));
-        assert!(matches!(contact_sheet(&data, Split::Test, 1), Err(SheetError::Size { .. })));
+        assert!(matches!(
+            contact_sheet(&data, Split::Train, 0),
+            Err(SheetError::Size { .. })
+        ));
+        assert!(matches!(
+            contact_sheet(&data, Split::Train, usize::MAX),
+            Err(SheetError::Size { .. })
+        ));
+        assert!(matches!(
+            contact_sheet(&data, Split::Test, 1),
+            Err(SheetError::Size { .. })
+        ));
     }
 
     #[test]
@@ -166,7 +220,12 @@ mod tests {
         write_png(&file, &picture).unwrap();
         let read = Pixmap::load_png(&file).unwrap();
         assert_eq!((read.width(), read.height()), (7, 5));
-        assert!(read.pixels().iter().zip(picture.cells()).all(|(p, &g)| p.red() == g && p.alpha() == 255));
+        assert!(
+            read.pixels()
+                .iter()
+                .zip(picture.cells())
+                .all(|(p, &g)| p.red() == g && p.alpha() == 255)
+        );
         let error = write_png(&folder.path().join("no/sheet.png"), &picture).unwrap_err();
         assert!(error.to_string().contains("no/sheet.png"), "{error}");
     }

@@ -53,7 +53,10 @@ impl Stage {
             return Err(PictureError::Size { width, height: 0 });
         }
         let least = least_width(walk);
-        let zoom = (f64::from(width) / 480.0).round().min((f64::from(width) / least).floor()).max(1.0);
+        let zoom = (f64::from(width) / 480.0)
+            .round()
+            .min((f64::from(width) / least).floor())
+            .max(1.0);
         let has_legend = f64::from(width) >= least * zoom;
         let (smallest, largest) = (VOXEL.start() * zoom, VOXEL.end() * zoom);
         let (first, all) = (walk.extent(0..1), walk.extent(0..walk.frames()));
@@ -65,8 +68,13 @@ impl Stage {
         let fixed = f64::from(width) / (right - left + 2.0 * MARGIN);
         let highest = 1.2 * f64::from(width) / top;
         let follow = fixed < smallest.min(highest);
-        let scale =
-            if follow { f64::from(width) / (1.7 * size + 8.0) } else { fixed }.min(highest).min(largest);
+        let scale = if follow {
+            f64::from(width) / (1.7 * size + 8.0)
+        } else {
+            fixed
+        }
+        .min(highest)
+        .min(largest);
         let panel = PANEL * zoom;
         let surface = (panel + top * scale).round();
         let height = (surface + GROUND * zoom) as u32;
@@ -94,7 +102,10 @@ impl Stage {
 
     /// Gives voxels hard edges, whose fewer colours keep animations small.
     pub(crate) fn crisp(self) -> Self {
-        Stage { crisp: true, ..self }
+        Stage {
+            crisp: true,
+            ..self
+        }
     }
 
     /// Sets the look of the world.
@@ -104,7 +115,10 @@ impl Stage {
 
     /// Maps a point of the world to pixels, y down, in the picture of a frame.
     pub(crate) fn to_pixels(&self, frame: usize, [x, y]: [f64; 2]) -> [f64; 2] {
-        [(x - self.left_edge(frame)) * self.scale, self.surface - y * self.scale]
+        [
+            (x - self.left_edge(frame)) * self.scale,
+            self.surface - y * self.scale,
+        ]
     }
 
     /// Returns the part of the world in the picture of a frame.
@@ -122,7 +136,11 @@ impl Stage {
     }
 
     fn left_edge(&self, frame: usize) -> f64 {
-        self.left.get(frame).or(self.left.last()).copied().unwrap_or(0.0)
+        self.left
+            .get(frame)
+            .or(self.left.last())
+            .copied()
+            .unwrap_or(0.0)
     }
 }
 
@@ -132,8 +150,13 @@ fn reach(walk: &Walk) -> (f64, f64) {
     let all = walk.extent(0..walk.frames());
     let size = walk.recording().body.width() as f64;
     let centres = (0..walk.frames()).map(|f| walk.centre(f)[0]);
-    let (low, high) = centres.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-    (all.left.max(low - size - 2.0).min(low), all.right.min(high + size + 2.0).max(high))
+    let (low, high) = centres.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
+        (l.min(x), h.max(x))
+    });
+    (
+        all.left.max(low - size - 2.0).min(low),
+        all.right.min(high + size + 2.0).max(high),
+    )
 }
 
 /// Returns the camera's x per frame: the centres, averaged twice over [`SMOOTHING`] frames on both
@@ -183,7 +206,9 @@ mod tests {
         let extent = walk.extent(0..walk.frames());
         assert!((0..walk.frames()).all(|f| stage.window(f) == stage.window(0)));
         let window = stage.window(0);
-        assert!(window.left < extent.left && extent.right < window.right && extent.top < window.top);
+        assert!(
+            window.left < extent.left && extent.right < window.right && extent.top < window.top
+        );
         assert!((stage.to_pixels(0, [window.left, 0.0])[0]).abs() < 1e-6);
     }
 
@@ -207,23 +232,40 @@ mod tests {
 
     #[test]
     fn any_recording_gives_a_picture_of_modest_size() {
-        for body in ["3", &"3".repeat(64), &["3"; 64].join("/"), &[&*"3".repeat(64); 64].join("/")] {
+        for body in [
+            "3",
+            &"3".repeat(64),
+            &["3"; 64].join("/"),
+            &[&*"3".repeat(64); 64].join("/"),
+        ] {
             let mut recording = simulated(body, 1, 3, false);
             for x in [0.0, 1e6, -1e30, f64::NAN] {
                 let moved = [x, x];
-                recording.frames[2].points.iter_mut().for_each(|p| *p = moved);
+                recording.frames[2]
+                    .points
+                    .iter_mut()
+                    .for_each(|p| *p = moved);
                 recording.frames[2].centre = moved;
                 let walk = Walk::new(&recording).unwrap();
                 let stage = Stage::new(&walk, 480).unwrap();
-                assert!((120..=800).contains(&stage.height), "{body} {x}: {}", stage.height);
+                assert!(
+                    (120..=800).contains(&stage.height),
+                    "{body} {x}: {}",
+                    stage.height
+                );
                 let window = stage.window(2);
-                assert!(window.left.is_finite() && window.right > window.left && window.scale >= 1.0);
+                assert!(
+                    window.left.is_finite() && window.right > window.left && window.scale >= 1.0
+                );
                 let seen = stage.to_pixels(2, walk.centre(2))[0];
                 assert!((0.0..=480.0).contains(&seen), "{x}: {seen}");
             }
         }
         let recording = simulated("3", 1, 1, false);
         let walk = Walk::new(&recording).unwrap();
-        assert!(matches!(Stage::new(&walk, 10), Err(PictureError::Size { width: 10, .. })));
+        assert!(matches!(
+            Stage::new(&walk, 10),
+            Err(PictureError::Size { width: 10, .. })
+        ));
     }
 }

@@ -43,19 +43,36 @@ impl<'a> Walk<'a> {
         let (Some(first), Some(first_phase)) = (frames.first(), phases.first()) else {
             return bad("expected at least one frame and one phase");
         };
-        let rising = phases.windows(2).all(|p| p[0].first_frame < p[1].first_frame);
+        let rising = phases
+            .windows(2)
+            .all(|p| p[0].first_frame < p[1].first_frame);
         let last = phases.last().map_or(0, |p| p.first_frame);
         if first_phase.first_frame != 0 || !rising || last >= frames.len() {
-            return bad("expected phases in order, the first at frame 0 and each with at least one frame");
+            return bad(
+                "expected phases in order, the first at frame 0 and each with at least one frame",
+            );
         }
         let points = frames.iter().map(|f| f.points.len()).min().unwrap_or(0);
-        if recording.voxels.iter().flat_map(|v| v.corners).any(|c| c >= points) {
+        if recording
+            .voxels
+            .iter()
+            .flat_map(|v| v.corners)
+            .any(|c| c >= points)
+        {
             return bad("a voxel has a corner that is not among the points of every frame");
         }
-        let fresh =
-            phases.iter().map(|p| frames.get(p.first_frame).is_some_and(|f| f.points == first.points));
+        let fresh = phases.iter().map(|p| {
+            frames
+                .get(p.first_frame)
+                .is_some_and(|f| f.points == first.points)
+        });
         let fresh = fresh.collect();
-        Ok(Walk { recording, centres: finite_centres(recording), fresh, sides: sides(recording) })
+        Ok(Walk {
+            recording,
+            centres: finite_centres(recording),
+            fresh,
+            sides: sides(recording),
+        })
     }
 
     /// Returns the recording.
@@ -70,7 +87,11 @@ impl<'a> Walk<'a> {
 
     /// Returns the index of the phase that contains a frame.
     pub(crate) fn phase_index(&self, frame: usize) -> usize {
-        self.recording.phases.iter().rposition(|p| p.first_frame <= frame).unwrap_or(0)
+        self.recording
+            .phases
+            .iter()
+            .rposition(|p| p.first_frame <= frame)
+            .unwrap_or(0)
     }
 
     /// Returns the phase that contains a frame.
@@ -80,7 +101,12 @@ impl<'a> Walk<'a> {
 
     /// Returns the frames of a phase.
     pub(crate) fn phase_frames(&self, phase: usize) -> Range<usize> {
-        let first = |p: usize| self.recording.phases.get(p).map_or(self.frames(), |p| p.first_frame);
+        let first = |p: usize| {
+            self.recording
+                .phases
+                .get(p)
+                .map_or(self.frames(), |p| p.first_frame)
+        };
         first(phase)..first(phase + 1)
     }
 
@@ -102,7 +128,13 @@ impl<'a> Walk<'a> {
     /// Returns the frames of the rollout that contains a frame, from the last reset to the next.
     pub(crate) fn rollout(&self, frame: usize) -> Range<usize> {
         let phase = self.phase_index(frame);
-        let resets = || self.fresh.iter().enumerate().filter(|(_, f)| **f).map(|(p, _)| p);
+        let resets = || {
+            self.fresh
+                .iter()
+                .enumerate()
+                .filter(|(_, f)| **f)
+                .map(|(p, _)| p)
+        };
         let first = resets().rfind(|&p| p <= phase).unwrap_or(0);
         let next = resets().find(|&p| p > phase).unwrap_or(self.fresh.len());
         self.phase_frames(first).start..self.phase_frames(next).start
@@ -131,21 +163,41 @@ impl<'a> Walk<'a> {
     }
 
     fn sides_of(&self, frame: usize, outer: bool) -> impl Iterator<Item = [[f64; 2]; 2]> {
-        let sides = self.sides.iter().filter(move |(_, voxels)| (*voxels == 1) == outer);
+        let sides = self
+            .sides
+            .iter()
+            .filter(move |(_, voxels)| (*voxels == 1) == outer);
         sides.filter_map(move |([a, b], _)| Some([self.point(frame, *a)?, self.point(frame, *b)?]))
     }
 
     /// Returns the extent of the body over some frames, or its undeformed box if nothing is finite.
     pub(crate) fn extent(&self, frames: Range<usize>) -> Extent {
-        let (height, width) = (self.recording.body.height() as f64, self.recording.body.width() as f64);
-        let nothing = Extent { left: f64::INFINITY, right: f64::NEG_INFINITY, top: 0.0 };
-        let extent = frames.flat_map(|f| self.recording.frames.get(f)).flat_map(|f| &f.points);
+        let (height, width) = (
+            self.recording.body.height() as f64,
+            self.recording.body.width() as f64,
+        );
+        let nothing = Extent {
+            left: f64::INFINITY,
+            right: f64::NEG_INFINITY,
+            top: 0.0,
+        };
+        let extent = frames
+            .flat_map(|f| self.recording.frames.get(f))
+            .flat_map(|f| &f.points);
         let extent = extent.filter(|p| is_near(p)).fold(nothing, |e, p| Extent {
             left: e.left.min(p[0]),
             right: e.right.max(p[0]),
             top: e.top.max(p[1]),
         });
-        if extent.left <= extent.right { extent } else { Extent { left: 0.0, right: width, top: height } }
+        if extent.left <= extent.right {
+            extent
+        } else {
+            Extent {
+                left: 0.0,
+                right: width,
+                top: height,
+            }
+        }
     }
 
     fn point(&self, frame: usize, point: usize) -> Option<[f64; 2]> {
@@ -166,7 +218,10 @@ fn is_near(position: &[f64; 2]) -> bool {
 }
 
 fn finite_centres(recording: &Recording) -> Vec<[f64; 2]> {
-    let mut last = [recording.body.width() as f64 / 2.0, recording.body.height() as f64 / 2.0];
+    let mut last = [
+        recording.body.width() as f64 / 2.0,
+        recording.body.height() as f64 / 2.0,
+    ];
     let centres = recording.frames.iter().map(|frame| {
         if is_near(&frame.centre) {
             last = frame.centre;
@@ -233,7 +288,10 @@ mod tests {
     fn outlines_are_the_sides_of_one_voxel_only() {
         let recording = simulated("333/303/333", 1, 2, false);
         let walk = Walk::new(&recording).unwrap();
-        assert_eq!((walk.outline(0).count(), walk.seams(0).count()), (12 + 4, 8));
+        assert_eq!(
+            (walk.outline(0).count(), walk.seams(0).count()),
+            (12 + 4, 8)
+        );
     }
 
     #[test]

@@ -52,8 +52,18 @@ impl Cppn {
     /// Returns the start of evolution: inputs fully connected to squashing outputs with weights 0.
     pub(crate) fn initial() -> Self {
         let pairs = (INPUTS..FIRST_HIDDEN).flat_map(|to| (0..INPUTS).map(move |from| (from, to)));
-        let edges = pairs.map(|(from, to)| Edge { from, to, weight: 0.0 }).collect();
-        Cppn { outputs: [Function::Squash; OUTPUTS], hidden: Vec::new(), edges }
+        let edges = pairs
+            .map(|(from, to)| Edge {
+                from,
+                to,
+                weight: 0.0,
+            })
+            .collect();
+        Cppn {
+            outputs: [Function::Squash; OUTPUTS],
+            hidden: Vec::new(),
+            edges,
+        }
     }
 
     /// Returns the number of nodes: inputs, outputs and hidden.
@@ -81,7 +91,10 @@ impl Cppn {
     /// Returns the function of an output or hidden node; `None` for inputs and unused numbers.
     pub(crate) fn function(&self, node: usize) -> Option<Function> {
         let (outputs, hidden) = (node.checked_sub(INPUTS)?, node.checked_sub(FIRST_HIDDEN));
-        self.outputs.get(outputs).or_else(|| self.hidden.get(hidden?)).copied()
+        self.outputs
+            .get(outputs)
+            .or_else(|| self.hidden.get(hidden?))
+            .copied()
     }
 
     /// Returns all nodes, each after its predecessors.
@@ -93,7 +106,9 @@ impl Cppn {
             waiting_for[e.to] += 1;
             successors[e.from].push(e.to);
         }
-        let mut order: Vec<usize> = (0..self.node_count()).filter(|&n| waiting_for[n] == 0).collect();
+        let mut order: Vec<usize> = (0..self.node_count())
+            .filter(|&n| waiting_for[n] == 0)
+            .collect();
         let mut done = 0;
         while done < order.len() {
             for &next in &successors[order[done]] {
@@ -166,7 +181,9 @@ impl Cppn {
         let mut useful: Vec<bool> = (0..self.node_count()).map(|n| n < FIRST_HIDDEN).collect();
         for &node in order.iter().rev() {
             if useful[node] {
-                self.incoming(node).iter().for_each(|e| useful[e.from] = true);
+                self.incoming(node)
+                    .iter()
+                    .for_each(|e| useful[e.from] = true);
             }
         }
         self.retain_hidden(|node| fed[node] && useful[node]);
@@ -176,19 +193,30 @@ impl Cppn {
     pub(super) fn retain_hidden(&mut self, keep: impl Fn(usize) -> bool) {
         let kept = |node: usize| node < FIRST_HIDDEN || keep(node);
         let mut next = 0..;
-        let renamed: Vec<Option<usize>> =
-            (0..self.node_count()).map(|node| if kept(node) { next.next() } else { None }).collect();
+        let renamed: Vec<Option<usize>> = (0..self.node_count())
+            .map(|node| if kept(node) { next.next() } else { None })
+            .collect();
         let hidden = std::mem::take(&mut self.hidden);
         let numbered = hidden.into_iter().zip(FIRST_HIDDEN..);
-        self.hidden = numbered.filter(|(_, node)| kept(*node)).map(|(f, _)| f).collect();
+        self.hidden = numbered
+            .filter(|(_, node)| kept(*node))
+            .map(|(f, _)| f)
+            .collect();
         // The new numbers keep the old order: the edges stay sorted.
         let edges = std::mem::take(&mut self.edges);
-        let rename = |e: Edge| Some(Edge { from: renamed[e.from]?, to: renamed[e.to]?, ..e });
+        let rename = |e: Edge| {
+            Some(Edge {
+                from: renamed[e.from]?,
+                to: renamed[e.to]?,
+                ..e
+            })
+        };
         self.edges = edges.into_iter().filter_map(rename).collect();
     }
 
     fn position(&self, from: usize, to: usize) -> Result<usize, usize> {
-        self.edges.binary_search_by_key(&(to, from), |e| (e.to, e.from))
+        self.edges
+            .binary_search_by_key(&(to, from), |e| (e.to, e.from))
     }
 
     /// Returns true if `node` is `of` or one of its direct or indirect predecessors.
@@ -238,7 +266,11 @@ mod tests {
     fn evolution_starts_fully_connected_with_weights_0() {
         let cppn = Cppn::initial();
         assert_eq!((cppn.edges().len(), cppn.hidden().len()), (28, 0));
-        assert!(cppn.edges().iter().all(|e| e.weight == 0.0 && e.from < 4 && (4..11).contains(&e.to)));
+        assert!(
+            cppn.edges()
+                .iter()
+                .all(|e| e.weight == 0.0 && e.from < 4 && (4..11).contains(&e.to))
+        );
         assert!((4..11).all(|n| cppn.function(n) == Some(Function::Squash)));
         assert_eq!((cppn.function(3), cppn.function(11)), (None, None));
     }
@@ -278,7 +310,11 @@ mod tests {
         unfed.disconnect(unfed.edges.iter().position(|e| e.to == 11).unwrap());
         unfed.prune();
         assert_eq!(unfed.hidden(), [Function::Sin]);
-        let edges: Vec<_> = unfed.edges().iter().map(|e| (e.from, e.to, e.weight)).collect();
+        let edges: Vec<_> = unfed
+            .edges()
+            .iter()
+            .map(|e| (e.from, e.to, e.weight))
+            .collect();
         assert_eq!(edges, [(11, 5, 0.7), (1, 11, 0.3)]);
     }
 

@@ -11,7 +11,10 @@ use std::collections::BTreeMap;
 /// Beckmann, Pennock & Ofria, ECAL 2009). In files a list of `[row, column, material]`. Edits
 /// outside a body's grid have no effect.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(try_from = "Vec<(usize, usize, Material)>", into = "Vec<(usize, usize, Material)>")]
+#[serde(
+    try_from = "Vec<(usize, usize, Material)>",
+    into = "Vec<(usize, usize, Material)>"
+)]
 pub(crate) struct Edits(pub(super) BTreeMap<(usize, usize), Material>);
 
 /// The reason why a list is not one of edits.
@@ -44,7 +47,10 @@ impl Edits {
     pub(super) fn apply(&self, described: &Body) -> Grid<Material> {
         let voxels = described.voxels();
         Grid::from_fn(voxels.height(), voxels.width(), |row, column| {
-            self.0.get(&(row, column)).copied().unwrap_or(voxels[(row, column)])
+            self.0
+                .get(&(row, column))
+                .copied()
+                .unwrap_or(voxels[(row, column)])
         })
     }
 
@@ -76,7 +82,11 @@ impl TryFrom<Vec<(usize, usize, Material)>> for Edits {
 
 impl From<Edits> for Vec<(usize, usize, Material)> {
     fn from(edits: Edits) -> Self {
-        edits.0.into_iter().map(|((row, column), material)| (row, column, material)).collect()
+        edits
+            .0
+            .into_iter()
+            .map(|((row, column), material)| (row, column, material))
+            .collect()
     }
 }
 
@@ -92,8 +102,14 @@ mod tests {
     fn edits_replace_what_the_network_describes() {
         let described: Body = "012/345".parse().unwrap();
         let edits = read("[[1,2,6],[0,0,3],[40,0,1]]").unwrap();
-        assert_eq!(Body::new(edits.apply(&described)).unwrap().to_string(), "312\n346");
-        assert_eq!(Body::new(Edits::default().apply(&described)).unwrap(), described);
+        assert_eq!(
+            Body::new(edits.apply(&described)).unwrap().to_string(),
+            "312\n346"
+        );
+        assert_eq!(
+            Body::new(Edits::default().apply(&described)).unwrap(),
+            described
+        );
     }
 
     #[test]
@@ -110,7 +126,11 @@ mod tests {
         let edits = read("[[1,2,6],[0,0,3]]").unwrap();
         assert_eq!(serde_json::to_string(&edits).unwrap(), "[[0,0,3],[1,2,6]]");
         assert_eq!(edits.canonical_bytes(), [0, 0, 3, 1, 2, 6]);
-        assert!(read("[[1,2,6],[1,2,3]]").unwrap_err().contains("row 1, column 2 is there twice"));
+        assert!(
+            read("[[1,2,6],[1,2,3]]")
+                .unwrap_err()
+                .contains("row 1, column 2 is there twice")
+        );
         assert!(read("[[64,2,6]]").unwrap_err().contains("row 64, column 2"));
         assert!(read("[[1,2,7]]").unwrap_err().contains('7'));
     }

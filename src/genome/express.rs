@@ -49,7 +49,9 @@ impl Cppn {
             // Values are finite, so an edge of weight 0 (all are at first) adds nothing.
             for edge in self.incoming(node).iter().filter(|e| e.weight != 0.0) {
                 let source = &values[edge.from];
-                sums.iter_mut().zip(source).for_each(|(sum, value)| *sum += edge.weight * value);
+                sums.iter_mut()
+                    .zip(source)
+                    .for_each(|(sum, value)| *sum += edge.weight * value);
             }
             function.apply(&mut sums);
             values[node] = sums;
@@ -65,13 +67,23 @@ fn inputs(height: usize, width: usize) -> [Vec<f64>; INPUTS] {
         _ => 2.0 * i as f64 / (n - 1) as f64 - 1.0,
     };
     let cells = || (0..height * width).map(|i| (i / width, i % width));
-    let x: Vec<f64> = cells().map(|(_, column)| coordinate(column, width)).collect();
+    let x: Vec<f64> = cells()
+        .map(|(_, column)| coordinate(column, width))
+        .collect();
     let y: Vec<f64> = cells().map(|(row, _)| coordinate(row, height)).collect();
-    let mut distance: Vec<f64> = x.iter().zip(&y).map(|(x, y)| (x * x + y * y).sqrt()).collect();
+    let mut distance: Vec<f64> = x
+        .iter()
+        .zip(&y)
+        .map(|(x, y)| (x * x + y * y).sqrt())
+        .collect();
     let least = distance.iter().copied().fold(f64::INFINITY, f64::min);
     let most = distance.iter().copied().fold(0.0, f64::max);
     for d in &mut distance {
-        *d = if most > least { 2.0 * (*d - least) / (most - least) - 1.0 } else { 0.0 };
+        *d = if most > least {
+            2.0 * (*d - least) / (most - least) - 1.0
+        } else {
+            0.0
+        };
     }
     let bias = vec![1.0; height * width];
     [x, y, distance, bias]
@@ -90,7 +102,11 @@ mod tests {
             cppn.add_hidden(*f);
         });
         for &(from, to, weight) in edges {
-            match cppn.edges().iter().position(|e| (e.from, e.to) == (from, to)) {
+            match cppn
+                .edges()
+                .iter()
+                .position(|e| (e.from, e.to) == (from, to))
+            {
                 Some(edge) => cppn.set_weight(edge, weight),
                 None => cppn.connect(from, to, weight),
             }
@@ -120,18 +136,27 @@ mod tests {
         let [_, _, distance, bias] = inputs(3, 3);
         let edge = 2.0 / 2f64.sqrt() - 1.0;
         let expected = [1.0, edge, 1.0, edge, -1.0, edge, 1.0, edge, 1.0];
-        distance.iter().zip(expected).for_each(|(d, e)| assert!((d - e).abs() < 1e-15, "{distance:?}"));
+        distance
+            .iter()
+            .zip(expected)
+            .for_each(|(d, e)| assert!((d - e).abs() < 1e-15, "{distance:?}"));
         assert_eq!(bias, [1.0; 9]);
         // Four corners are equally far from the centre.
         assert_eq!(inputs(2, 2)[2], [0.0; 4]);
         assert_eq!(text(&network(&[], &[(2, 5, 1.0)]), 3, 3), "111\n101\n111");
-        assert_eq!(text(&network(&[], &[(3, 10, 0.5), (3, 5, 0.5)]), 1, 2), "11");
+        assert_eq!(
+            text(&network(&[], &[(3, 10, 0.5), (3, 5, 0.5)]), 1, 2),
+            "11"
+        );
     }
 
     #[test]
     fn a_hidden_node_applies_its_function_for_every_successor() {
         // 11 = |x| goes to two outputs: both get |x|, not x.
-        let cppn = network(&[Function::Abs], &[(0, 11, 1.0), (11, 5, 0.4), (11, 6, 0.5)]);
+        let cppn = network(
+            &[Function::Abs],
+            &[(0, 11, 1.0), (11, 5, 0.4), (11, 6, 0.5)],
+        );
         assert_eq!(text(&cppn, 1, 3), "202");
     }
 
@@ -147,8 +172,14 @@ mod tests {
     #[test]
     fn impossible_sizes_are_typed_errors() {
         let cppn = Cppn::initial();
-        assert!(matches!(cppn.express(0, 5), Err(BodyError::Shape(GridError::Empty))));
-        assert!(matches!(cppn.express(5, usize::MAX), Err(BodyError::TooLarge { .. })));
+        assert!(matches!(
+            cppn.express(0, 5),
+            Err(BodyError::Shape(GridError::Empty))
+        ));
+        assert!(matches!(
+            cppn.express(5, usize::MAX),
+            Err(BodyError::TooLarge { .. })
+        ));
         assert_eq!(cppn.express(64, 64).unwrap().height(), 64);
     }
 }

@@ -25,7 +25,9 @@ pub(super) struct CppnFile {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub(crate) enum CppnError {
     /// The file has another version of the form.
-    #[error("version {0} of the CPPN form is unknown; expected {VERSION} (made by a newer morphcog?)")]
+    #[error(
+        "version {0} of the CPPN form is unknown; expected {VERSION} (made by a newer morphcog?)"
+    )]
     Version(u32),
     /// There is not one function per material.
     #[error("outputs: {0} functions, expected {OUTPUTS}, one per material")]
@@ -66,26 +68,37 @@ impl TryFrom<CppnFile> for Cppn {
         if file.version != VERSION {
             return Err(CppnError::Version(file.version));
         }
-        let outputs: [Function; OUTPUTS] =
-            file.outputs.try_into().map_err(|found: Vec<_>| CppnError::Outputs(found.len()))?;
+        let outputs: [Function; OUTPUTS] = file
+            .outputs
+            .try_into()
+            .map_err(|found: Vec<_>| CppnError::Outputs(found.len()))?;
         if file.hidden.len() > MAX_HIDDEN {
             return Err(CppnError::TooLarge(file.hidden.len()));
         }
         if let Some(at) = file.hidden.iter().position(|f| *f == Function::Squash) {
             return Err(CppnError::HiddenSquash(at));
         }
-        let mut cppn = Cppn { outputs, hidden: file.hidden, edges: file.edges };
+        let mut cppn = Cppn {
+            outputs,
+            hidden: file.hidden,
+            edges: file.edges,
+        };
         let nodes = cppn.node_count();
         cppn.edges.sort_by_key(|e| (e.to, e.from));
         for &Edge { from, to, weight } in &cppn.edges {
-            if from >= nodes || to >= nodes || (INPUTS..FIRST_HIDDEN).contains(&from) || to < INPUTS {
+            if from >= nodes || to >= nodes || (INPUTS..FIRST_HIDDEN).contains(&from) || to < INPUTS
+            {
                 return Err(CppnError::Ends { from, to, nodes });
             }
             if !weight.is_finite() {
                 return Err(CppnError::Weight(from, to));
             }
         }
-        if let Some(pair) = cppn.edges.windows(2).find(|p| (p[0].from, p[0].to) == (p[1].from, p[1].to)) {
+        if let Some(pair) = cppn
+            .edges
+            .windows(2)
+            .find(|p| (p[0].from, p[0].to) == (p[1].from, p[1].to))
+        {
             return Err(CppnError::Duplicate(pair[0].from, pair[0].to));
         }
         if cppn.topological_order().len() < nodes {
@@ -97,8 +110,17 @@ impl TryFrom<CppnFile> for Cppn {
 
 impl From<Cppn> for CppnFile {
     fn from(cppn: Cppn) -> Self {
-        let Cppn { outputs, hidden, edges } = cppn;
-        CppnFile { version: VERSION, outputs: outputs.to_vec(), hidden, edges }
+        let Cppn {
+            outputs,
+            hidden,
+            edges,
+        } = cppn;
+        CppnFile {
+            version: VERSION,
+            outputs: outputs.to_vec(),
+            hidden,
+            edges,
+        }
     }
 }
 
@@ -109,7 +131,9 @@ mod tests {
 
     fn read(hidden: &str, edges: &str) -> Result<Cppn, String> {
         let outputs = ["\"squash\""; OUTPUTS].join(",");
-        let text = format!(r#"{{"version":1,"outputs":[{outputs}],"hidden":[{hidden}],"edges":[{edges}]}}"#);
+        let text = format!(
+            r#"{{"version":1,"outputs":[{outputs}],"hidden":[{hidden}],"edges":[{edges}]}}"#
+        );
         serde_json::from_str(&text).map_err(|e| e.to_string())
     }
 
@@ -117,7 +141,10 @@ mod tests {
     fn the_file_form_goes_there_and_back() {
         let initial = Cppn::initial();
         let text = serde_json::to_string(&initial).unwrap();
-        assert!(text.starts_with(r#"{"version":1,"outputs":["squash","#), "{text}");
+        assert!(
+            text.starts_with(r#"{"version":1,"outputs":["squash","#),
+            "{text}"
+        );
         assert_eq!(serde_json::from_str::<Cppn>(&text).unwrap(), initial);
         let cppn = read(r#""sin","neg_sqrt""#, "[12,4,-0.25],[0,11,0.1],[11,12,1.0]").unwrap();
         let text = serde_json::to_string(&cppn).unwrap();
@@ -134,7 +161,11 @@ mod tests {
             assert!(error.contains(word), "{error}");
         };
         refused(r#""sin""#, "[11,11,1.0]", "cycle");
-        refused(r#""sin","sin""#, "[0,11,1.0],[11,12,1.0],[12,11,1.0]", "cycle");
+        refused(
+            r#""sin","sin""#,
+            "[0,11,1.0],[11,12,1.0],[12,11,1.0]",
+            "cycle",
+        );
         refused("", "[0,11,1.0]", "0 → 11");
         refused("", "[99,4,1.0]", "99 → 4");
         refused("", "[4,5,1.0]", "4 → 5");
@@ -161,7 +192,11 @@ mod tests {
             version: VERSION,
             outputs: vec![Function::Squash; OUTPUTS],
             hidden: vec![],
-            edges: vec![Edge { from: 0, to: 4, weight }],
+            edges: vec![Edge {
+                from: 0,
+                to: 4,
+                weight,
+            }],
         };
         assert!(Cppn::try_from(file(1e300)).is_ok());
         for weight in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {

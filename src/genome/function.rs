@@ -66,7 +66,11 @@ impl Function {
 fn each(sums: &mut [f64], function: impl Fn(f64) -> f64) {
     for s in sums {
         let value = function(*s);
-        *s = if value.is_nan() { 0.0 } else { value.clamp(-LIMIT, LIMIT) };
+        *s = if value.is_nan() {
+            0.0
+        } else {
+            value.clamp(-LIMIT, LIMIT)
+        };
     }
 }
 
@@ -93,15 +97,28 @@ mod tests {
     #[test]
     fn squash_is_odd_and_saturates() {
         assert_eq!(at(Function::Squash, 0.0), 0.0);
-        assert_eq!((at(Function::Squash, 1e100), at(Function::Squash, -1e100)), (1.0, -1.0));
+        assert_eq!(
+            (at(Function::Squash, 1e100), at(Function::Squash, -1e100)),
+            (1.0, -1.0)
+        );
     }
 
     #[test]
     fn values_stay_finite_whatever_comes_in() {
-        for s in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, f64::MIN, 1e200] {
+        for s in [
+            f64::NAN,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            f64::MAX,
+            f64::MIN,
+            1e200,
+        ] {
             for function in Function::ALL {
                 let value = at(function, s);
-                assert!(value.is_finite() && value.abs() <= LIMIT, "{function:?}({s}) = {value}");
+                assert!(
+                    value.is_finite() && value.abs() <= LIMIT,
+                    "{function:?}({s}) = {value}"
+                );
             }
         }
     }

@@ -80,7 +80,10 @@ pub enum GenomeError {
 impl Genome {
     /// Returns the start of evolution: [`Cppn::initial`], an empty body.
     pub fn initial() -> Self {
-        Genome { cppn: Cppn::initial(), edits: Edits::default() }
+        Genome {
+            cppn: Cppn::initial(),
+            edits: Edits::default(),
+        }
     }
 
     /// Applies one random mutation to the network (paper, section "Genome").
@@ -94,7 +97,11 @@ impl Genome {
     /// Returns a [`BodyError`] if the size is impossible for a body.
     pub(crate) fn body(&self, height: usize, width: usize) -> Result<Body, BodyError> {
         let described = self.cppn.express(height, width)?;
-        if self.edits.is_empty() { Ok(described) } else { Body::new(self.edits.apply(&described)) }
+        if self.edits.is_empty() {
+            Ok(described)
+        } else {
+            Body::new(self.edits.apply(&described))
+        }
     }
 
     /// Returns a copy with this body; voxels that differ from the network's become edits.
@@ -107,7 +114,10 @@ impl Genome {
         body.voxels()
             .iter()
             .for_each(|(place, material)| edits.set(place, *material, described.voxels()[place]));
-        Ok(Genome { cppn: self.cppn.clone(), edits })
+        Ok(Genome {
+            cppn: self.cppn.clone(),
+            edits,
+        })
     }
 
     /// Returns a short id, equal for equal genomes: ten hexadecimal digits of its
@@ -163,7 +173,9 @@ impl Genome {
         let described = self.cppn.express(spec.height, spec.width)?;
         match self.with_voxels_changed(&described, spec, params, rng, session) {
             // No draw of voxels gave a valid body.
-            Err(GenomeError::NoValidBody { .. }) => self.with_mutated_network(spec, params, rng, session),
+            Err(GenomeError::NoValidBody { .. }) => {
+                self.with_mutated_network(spec, params, rng, session)
+            }
             changed => changed,
         }
     }
@@ -175,8 +187,16 @@ impl Genome {
         rng: &mut Stream,
         session: &Session,
     ) -> Result<(Genome, Body), GenomeError> {
-        let BodySpec { height, width, min_muscles } = spec;
-        let mutations = if min_muscles > height.saturating_mul(width) { 0 } else { MAX_MUTATIONS };
+        let BodySpec {
+            height,
+            width,
+            min_muscles,
+        } = spec;
+        let mutations = if min_muscles > height.saturating_mul(width) {
+            0
+        } else {
+            MAX_MUTATIONS
+        };
         let mut genome = self.clone();
         for number in 1..=mutations {
             // The first check comes late: a run stopped at its start still gets its folder.
@@ -189,7 +209,12 @@ impl Genome {
                 return Ok((genome, body));
             }
         }
-        Err(GenomeError::NoValidBody { mutations, height, width, min_muscles })
+        Err(GenomeError::NoValidBody {
+            mutations,
+            height,
+            width,
+            min_muscles,
+        })
     }
 
     /// Mutates [`Genome::initial`] until its body is valid; returns the individual with that body.
@@ -223,7 +248,11 @@ mod tests {
     use super::*;
     use crate::base::random::{Purpose, stream};
 
-    pub(super) const PAPER: BodySpec = BodySpec { height: 14, width: 14, min_muscles: 3 };
+    pub(super) const PAPER: BodySpec = BodySpec {
+        height: 14,
+        width: 14,
+        min_muscles: 3,
+    };
 
     pub(super) fn rng(seed: u64) -> Stream {
         stream(seed, Purpose::RandomImmigrant, 0, 0)
@@ -248,7 +277,9 @@ mod tests {
         let rng = &mut rng(1);
         let (mut genome, _) = Genome::random(PAPER, &MutationParams::default(), rng).unwrap();
         for _ in 0..300 {
-            (genome, _) = genome.offspring(PAPER, &MutationParams::default(), rng).unwrap();
+            (genome, _) = genome
+                .offspring(PAPER, &MutationParams::default(), rng)
+                .unwrap();
         }
         let body = hash::hex(&crate::body::key(&genome.body(14, 14).unwrap()));
         assert_eq!((genome.id().as_str(), &body[..10]), PINNED);
@@ -269,9 +300,13 @@ mod tests {
         let mut ids = std::collections::BTreeSet::new();
         let mut digits = 0;
         for seed in 0..40 {
-            let (genome, _) = Genome::random(PAPER, &MutationParams::default(), &mut rng(seed)).unwrap();
+            let (genome, _) =
+                Genome::random(PAPER, &MutationParams::default(), &mut rng(seed)).unwrap();
             let (id, old) = (genome.id(), genome.digest()[..10].to_string());
-            assert!(id.starts_with(|c: char| c.is_ascii_lowercase()) && id[1..] == old[1..], "{id} {old}");
+            assert!(
+                id.starts_with(|c: char| c.is_ascii_lowercase()) && id[1..] == old[1..],
+                "{id} {old}"
+            );
             assert!(genome.has_id(&id) && genome.has_id(&old) && !genome.has_id(&id[1..]));
             digits += usize::from(id != old);
             ids.insert(id);
@@ -282,10 +317,17 @@ mod tests {
     #[test]
     fn hopeless_bodies_are_a_typed_error() {
         let error = |height, width, min_muscles| {
-            let spec = BodySpec { height, width, min_muscles };
+            let spec = BodySpec {
+                height,
+                width,
+                min_muscles,
+            };
             Genome::random(spec, &MutationParams::default(), &mut rng(0)).unwrap_err()
         };
-        assert!(matches!(error(1, 2, 3), GenomeError::NoValidBody { mutations: 0, .. }));
+        assert!(matches!(
+            error(1, 2, 3),
+            GenomeError::NoValidBody { mutations: 0, .. }
+        ));
         assert!(matches!(error(0, 2, 0), GenomeError::Size(_)));
         assert!(matches!(error(65, 2, 3), GenomeError::Size(_)));
     }

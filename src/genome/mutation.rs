@@ -88,7 +88,12 @@ fn remove_node(cppn: &mut Cppn, params: &MutationParams, rng: &mut Stream) -> Op
     let count = cppn.hidden().len();
     let node = FIRST_HIDDEN + (count > 0).then(|| rng.below(count))?;
     let into = cppn.incoming(node).to_vec();
-    let out: Vec<_> = cppn.edges().iter().copied().filter(|e| e.from == node).collect();
+    let out: Vec<_> = cppn
+        .edges()
+        .iter()
+        .copied()
+        .filter(|e| e.from == node)
+        .collect();
     for i in &into {
         for o in &out {
             // Products of weights within 1 stay within it; others must not grow without bound.
@@ -117,7 +122,11 @@ fn add_edge(cppn: &mut Cppn, params: &MutationParams, rng: &mut Stream) -> Optio
 
 fn change_function(cppn: &mut Cppn, rng: &mut Stream) -> Option<()> {
     let node = INPUTS + rng.below(OUTPUTS + cppn.hidden().len());
-    let legal = if node < FIRST_HIDDEN { &Function::ALL } else { Function::for_hidden() };
+    let legal = if node < FIRST_HIDDEN {
+        &Function::ALL
+    } else {
+        Function::for_hidden()
+    };
     let now = cppn.function(node)?;
     let others: Vec<Function> = legal.iter().copied().filter(|f| *f != now).collect();
     cppn.set_function(node, *rng.choose(&others)?);
@@ -147,7 +156,9 @@ mod tests {
 
     fn apply(mutation: Mutation, cppn: &Cppn, seed: u64) -> Option<Cppn> {
         let mut mutant = cppn.clone();
-        mutation.apply(&mut mutant, &MutationParams::default(), &mut rng(seed)).then_some(mutant)
+        mutation
+            .apply(&mut mutant, &MutationParams::default(), &mut rng(seed))
+            .then_some(mutant)
     }
 
     fn edges(cppn: &Cppn) -> Vec<(usize, usize, f64)> {
@@ -161,9 +172,15 @@ mod tests {
             cppn.disconnect(e);
         });
         let node = cppn.add_hidden(Function::Sin);
-        [(0, node, 0.5), (1, node, -0.4), (node, 4, 0.2), (node, 5, 1.0), (1, 5, 0.9)]
-            .iter()
-            .for_each(|&(from, to, weight)| cppn.connect(from, to, weight));
+        [
+            (0, node, 0.5),
+            (1, node, -0.4),
+            (node, 4, 0.2),
+            (node, 5, 1.0),
+            (1, 5, 0.9),
+        ]
+        .iter()
+        .for_each(|&(from, to, weight)| cppn.connect(from, to, weight));
         cppn
     }
 
@@ -173,9 +190,17 @@ mod tests {
         (0..28).for_each(|e| start.set_weight(e, 0.01 * e as f64));
         let mutant = apply(Mutation::AddNode, &start, 1).unwrap();
         assert_eq!((mutant.edges().len(), mutant.hidden().len()), (29, 1));
-        let out = mutant.edges().iter().find(|e| e.from == FIRST_HIDDEN).unwrap();
+        let out = mutant
+            .edges()
+            .iter()
+            .find(|e| e.from == FIRST_HIDDEN)
+            .unwrap();
         let into = mutant.incoming(FIRST_HIDDEN)[0];
-        let split = start.edges().iter().find(|e| (e.from, e.to) == (into.from, out.to)).unwrap();
+        let split = start
+            .edges()
+            .iter()
+            .find(|e| (e.from, e.to) == (into.from, out.to))
+            .unwrap();
         assert_eq!((into.weight, out.weight), (split.weight, 1.0));
         assert!(mutant.may_connect(into.from, out.to));
     }
@@ -184,7 +209,10 @@ mod tests {
     fn removing_a_node_joins_its_edges_where_there_is_none() {
         let mutant = apply(Mutation::RemoveNode, &diamond(), 1).unwrap();
         // 1 → 5 was there and keeps its weight.
-        assert_eq!(edges(&mutant), [(0, 4, 0.1), (1, 4, -0.4 * 0.2), (0, 5, 0.5), (1, 5, 0.9)]);
+        assert_eq!(
+            edges(&mutant),
+            [(0, 4, 0.1), (1, 4, -0.4 * 0.2), (0, 5, 0.5), (1, 5, 0.9)]
+        );
         assert!(mutant.hidden().is_empty());
     }
 
@@ -194,11 +222,17 @@ mod tests {
             .map(|seed| {
                 let mutant = apply(Mutation::AddEdge, &diamond(), seed).unwrap();
                 assert_eq!(mutant.edges().len(), 6);
-                let new = mutant.edges().iter().find(|e| !diamond().edges().contains(e)).unwrap();
+                let new = mutant
+                    .edges()
+                    .iter()
+                    .find(|e| !diamond().edges().contains(e))
+                    .unwrap();
                 new.weight
             })
             .collect();
-        assert!(signs.contains(&0.1) && signs.contains(&-0.1) && signs.iter().all(|w| w.abs() == 0.1));
+        assert!(
+            signs.contains(&0.1) && signs.contains(&-0.1) && signs.iter().all(|w| w.abs() == 0.1)
+        );
     }
 
     #[test]
@@ -209,7 +243,12 @@ mod tests {
         }
         let mut line = diamond();
         while line.edges().len() > 2 {
-            line.disconnect(line.edges().iter().position(|e| e.to == 5 || e.from == 1).unwrap());
+            line.disconnect(
+                line.edges()
+                    .iter()
+                    .position(|e| e.to == 5 || e.from == 1)
+                    .unwrap(),
+            );
         }
         let mutant = apply(Mutation::RemoveEdge, &line, 0).unwrap();
         assert!(mutant.hidden().is_empty() && mutant.edges().is_empty());
@@ -222,7 +261,9 @@ mod tests {
         let (mut squashed, mut hidden_changed) = (false, false);
         for seed in 0..400 {
             let mutant = apply(Mutation::ChangeFunction, &cppn, seed).unwrap();
-            let changed: Vec<usize> = (4..12).filter(|n| mutant.function(*n) != cppn.function(*n)).collect();
+            let changed: Vec<usize> = (4..12)
+                .filter(|n| mutant.function(*n) != cppn.function(*n))
+                .collect();
             assert_eq!(changed.len(), 1);
             squashed |= mutant.function(4) == Some(Function::Squash);
             hidden_changed |= changed == [11];
@@ -235,7 +276,12 @@ mod tests {
     fn changed_weights_are_normal_around_the_old_and_clipped() {
         let change = |seed| {
             let mutant = apply(Mutation::ChangeWeight, &Cppn::initial(), seed).unwrap();
-            let changed: Vec<f64> = mutant.edges().iter().map(|e| e.weight).filter(|w| *w != 0.0).collect();
+            let changed: Vec<f64> = mutant
+                .edges()
+                .iter()
+                .map(|e| e.weight)
+                .filter(|w| *w != 0.0)
+                .collect();
             assert_eq!(changed.len(), 1);
             changed[0]
         };
@@ -254,7 +300,11 @@ mod tests {
         (0..28).rev().for_each(|e| {
             bare.disconnect(e);
         });
-        for mutation in [Mutation::AddNode, Mutation::RemoveEdge, Mutation::ChangeWeight] {
+        for mutation in [
+            Mutation::AddNode,
+            Mutation::RemoveEdge,
+            Mutation::ChangeWeight,
+        ] {
             assert_eq!(apply(mutation, &bare, 0), None);
         }
     }

@@ -64,7 +64,9 @@ fn share<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     if (0.0..=1.0).contains(&value) {
         return Ok(value);
     }
-    Err(serde::de::Error::custom(format!("{value} is out of range; expected a number from 0 to 1")))
+    Err(serde::de::Error::custom(format!(
+        "{value} is out of range; expected a number from 0 to 1"
+    )))
 }
 
 fn size<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
@@ -72,7 +74,9 @@ fn size<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     if value > 0.0 && value <= 1000.0 {
         return Ok(value);
     }
-    Err(serde::de::Error::custom(format!("{value} is out of range; expected a number above 0, at most 1000")))
+    Err(serde::de::Error::custom(format!(
+        "{value} is out of range; expected a number above 0, at most 1000"
+    )))
 }
 
 #[cfg(test)]
@@ -81,13 +85,34 @@ mod tests {
 
     #[test]
     fn parameters_have_the_papers_defaults_and_refuse_nonsense() {
-        let read = |text: &str| serde_json::from_str::<MutationParams>(text).map_err(|e| e.to_string());
+        let read =
+            |text: &str| serde_json::from_str::<MutationParams>(text).map_err(|e| e.to_string());
         assert_eq!(read("{}").unwrap(), MutationParams::default());
         assert_eq!(read(r#"{"weight_sigma": 0.2}"#).unwrap().weight_sigma, 0.2);
-        assert!(read(r#"{"weight_sigma": -1}"#).unwrap_err().contains("-1 is out of range"));
-        assert!(read(r#"{"voxel_mutations": 1.01}"#).unwrap_err().contains("1.01 is out of range"));
-        assert!(read(r#"{"voxel_changes": 1001}"#).unwrap_err().contains("1001 is out of range"));
-        assert!(!serde_json::to_string(&MutationParams::default()).unwrap().contains("voxel"));
-        assert!(read(r#"{"weight_sgma": 1}"#).unwrap_err().contains("weight_sgma"));
+        assert!(
+            read(r#"{"weight_sigma": -1}"#)
+                .unwrap_err()
+                .contains("-1 is out of range")
+        );
+        assert!(
+            read(r#"{"voxel_mutations": 1.01}"#)
+                .unwrap_err()
+                .contains("1.01 is out of range")
+        );
+        assert!(
+            read(r#"{"voxel_changes": 1001}"#)
+                .unwrap_err()
+                .contains("1001 is out of range")
+        );
+        assert!(
+            !serde_json::to_string(&MutationParams::default())
+                .unwrap()
+                .contains("voxel")
+        );
+        assert!(
+            read(r#"{"weight_sgma": 1}"#)
+                .unwrap_err()
+                .contains("weight_sgma")
+        );
     }
 }

@@ -15,8 +15,12 @@ use std::collections::BTreeSet;
 
 /// Returns the indices of all images that a run, and its gaits before, were trained on.
 pub(crate) fn trained_on(run: &RunFile, dataset: &Dataset) -> Result<BTreeSet<usize>, Error> {
-    let mut seen: BTreeSet<usize> =
-        run.origin.iter().flat_map(|origin: &Origin| &origin.trained_on).copied().collect();
+    let mut seen: BTreeSet<usize> = run
+        .origin
+        .iter()
+        .flat_map(|origin: &Origin| &origin.trained_on)
+        .copied()
+        .collect();
     seen.extend(run.training_images.iter().map(|image| image.index));
     seen.extend(TrainingImages::indices(&run.config, dataset)?);
     Ok(seen)
@@ -59,8 +63,13 @@ fn per_class(
                 scarcest.len()
             );
             let error = match argument {
-                Some(name) => Error { kind: ErrorKind::Input, ..Error::argument(name, how_many, text) },
-                None => Error::input(format!("{IMAGES_KEY} = {how_many}: {text}")).with_key(IMAGES_KEY),
+                Some(name) => Error {
+                    kind: ErrorKind::Input,
+                    ..Error::argument(name, how_many, text)
+                },
+                None => {
+                    Error::input(format!("{IMAGES_KEY} = {how_many}: {text}")).with_key(IMAGES_KEY)
+                }
             };
             Err(error)
         }
@@ -73,20 +82,35 @@ fn per_class(
 ///
 /// # Errors
 /// Returns an error if a class has too few images.
-pub(crate) fn check(config: &Config, before: &[usize], key: &str, dataset: &Dataset) -> Result<(), Error> {
+pub(crate) fn check(
+    config: &Config,
+    before: &[usize],
+    key: &str,
+    dataset: &Dataset,
+) -> Result<(), Error> {
     let ValidationConfig { images, best } = config.validation;
     if best == 0 {
         return Ok(());
     }
-    let mut seen: BTreeSet<usize> = TrainingImages::indices(config, dataset)?.into_iter().collect();
+    let mut seen: BTreeSet<usize> = TrainingImages::indices(config, dataset)?
+        .into_iter()
+        .collect();
     seen.extend(before);
     let classes = config.classes();
     let left = left(&classes, &seen, dataset);
-    per_class(&classes, &left, None, HowMany::Evenly(images)).map(|_| ()).map_err(|error| {
-        let most = most(&left);
-        let fewer = if most >= LEAST { format!("ask for at most {most}, ") } else { String::new() };
-        error.advice(format!("{fewer}train on fewer ({key}), or choose none (validation.best = 0)"))
-    })
+    per_class(&classes, &left, None, HowMany::Evenly(images))
+        .map(|_| ())
+        .map_err(|error| {
+            let most = most(&left);
+            let fewer = if most >= LEAST {
+                format!("ask for at most {most}, ")
+            } else {
+                String::new()
+            };
+            error.advice(format!(
+                "{fewer}train on fewer ({key}), or choose none (validation.best = 0)"
+            ))
+        })
 }
 
 /// Draws `count` validation images for runs of one experiment. They are evenly divided between the
@@ -102,7 +126,14 @@ pub fn images(
     count: usize,
 ) -> Result<Vec<ImageRef>, Error> {
     let classes = runs.first().map_or(Vec::new(), |run| run.config.classes());
-    images_besides(&BTreeSet::new(), runs, &classes, dataset, argument, HowMany::Evenly(count))
+    images_besides(
+        &BTreeSet::new(),
+        runs,
+        &classes,
+        dataset,
+        argument,
+        HowMany::Evenly(count),
+    )
 }
 
 /// Draws validation images of these classes without those in `besides`; see [`images`].
@@ -117,7 +148,10 @@ pub(crate) fn images_besides(
     argument: Option<&'static str>,
     how_many: HowMany,
 ) -> Result<Vec<ImageRef>, Error> {
-    let first = runs.iter().map(|run| &run.config).min_by_key(|config| config.seed);
+    let first = runs
+        .iter()
+        .map(|run| &run.config)
+        .min_by_key(|config| config.seed);
     let Some(config) = first else {
         return Ok(Vec::new());
     };
@@ -126,20 +160,28 @@ pub(crate) fn images_besides(
         seen.extend(trained_on(run, dataset)?);
     }
     let left = left(classes, &seen, dataset);
-    let per_class = per_class(classes, &left, argument, how_many).map_err(|error| match most(&left) {
-        0 => error.advice("every image of that class was trained on; show test images"),
-        most => error.advice(format!("ask for at most {most}")),
-    })?;
+    let per_class =
+        per_class(classes, &left, argument, how_many).map_err(|error| match most(&left) {
+            0 => error.advice("every image of that class was trained on; show test images"),
+            most => error.advice(format!("ask for at most {most}")),
+        })?;
     let HowMany::Evenly(count) = how_many else {
         return Ok(left.concat());
     };
     let draw = |(&label, free): (&u8, Vec<ImageRef>)| -> Vec<ImageRef> {
         let mut random = stream(config.seed, Purpose::Validation, 0, u64::from(label));
-        random.sample(free.len(), per_class).into_iter().map(|i| free[i]).collect()
+        random
+            .sample(free.len(), per_class)
+            .into_iter()
+            .map(|i| free[i])
+            .collect()
     };
     let drawn: Vec<Vec<ImageRef>> = classes.iter().zip(left).map(draw).collect();
-    let turns =
-        (0..per_class).flat_map(|turn| drawn.iter().filter_map(move |class| class.get(turn).copied()));
+    let turns = (0..per_class).flat_map(|turn| {
+        drawn
+            .iter()
+            .filter_map(move |class| class.get(turn).copied())
+    });
     Ok(turns.take(count).collect())
 }
 
@@ -156,13 +198,19 @@ pub(crate) fn test_images(
 ) -> Result<Vec<ImageRef>, Error> {
     let count_of = |class: &&u8| dataset.indices_of(Split::Test, **class).len();
     if let Some(label) = classes.iter().find(|class| count_of(class) == 0) {
-        let text = format!("{}: there is no test image of class {label}", dataset.name());
+        let text = format!(
+            "{}: there is no test image of class {label}",
+            dataset.name()
+        );
         let there = dataset.classes(Split::Test);
         return Err(Error::input(text).advice(format!("there are of the classes {there:?}")));
     }
     let HowMany::Evenly(count) = how_many else {
         let of_class = |&label: &u8| {
-            dataset.indices_of(Split::Test, label).iter().map(move |&index| ImageRef { index, label })
+            dataset
+                .indices_of(Split::Test, label)
+                .iter()
+                .map(move |&index| ImageRef { index, label })
         };
         return Ok(classes.iter().flat_map(of_class).collect());
     };
@@ -171,8 +219,15 @@ pub(crate) fn test_images(
         let share = count / classes.len() + usize::from(place < count % classes.len());
         let drawn = dataset.draw(Split::Test, &[label], share, seed);
         let drawn = drawn.map_err(|error| {
-            let most = classes.iter().map(|class| count_of(&class)).min().unwrap_or(0);
-            let advice = format!("ask for at most {} images, or for all", most * classes.len());
+            let most = classes
+                .iter()
+                .map(|class| count_of(&class))
+                .min()
+                .unwrap_or(0);
+            let advice = format!(
+                "ask for at most {} images, or for all",
+                most * classes.len()
+            );
             Error::input(error.to_string()).advice(advice)
         })?;
         images.extend(drawn.into_iter().map(|index| ImageRef { index, label }));

@@ -30,10 +30,13 @@ pub struct TrainingImages {
 /// # Errors
 /// If it is less than `least`, the error names the class and all classes of the dataset.
 pub(crate) fn scarcest(dataset: &Dataset, classes: &[u8], least: usize) -> Result<usize, Error> {
-    let counts = classes.iter().map(|class| (dataset.indices_of(Split::Train, *class).len(), *class));
+    let counts = classes
+        .iter()
+        .map(|class| (dataset.indices_of(Split::Train, *class).len(), *class));
     match counts.min() {
         Some((count, class)) if count < least => {
-            let text = format!("class {class}: expected {least} training images or more, found {count}");
+            let text =
+                format!("class {class}: expected {least} training images or more, found {count}");
             let there = dataset.classes(Split::Train);
             Err(Error::input(text)
                 .about("task")
@@ -61,7 +64,12 @@ impl TrainingImages {
         match &config.data.train_images {
             Some(indices) => Ok(indices.clone()),
             None => dataset
-                .draw(Split::Train, &config.classes(), config.data.images_per_class, config.seed)
+                .draw(
+                    Split::Train,
+                    &config.classes(),
+                    config.data.images_per_class,
+                    config.seed,
+                )
                 .map_err(|error| {
                     let there = dataset.classes(Split::Train);
                     Error::input(format!("data.images_per_class: {error}"))
@@ -81,15 +89,20 @@ impl TrainingImages {
         for index in TrainingImages::indices(config, dataset)? {
             let label = dataset.label(Split::Train, index).map_err(refuse)?;
             if !classes.contains(&label) {
-                let text =
-                    format!("data.train_images: image {index} shows a {label}, expected one of {classes:?}");
+                let text = format!(
+                    "data.train_images: image {index} shows a {label}, expected one of {classes:?}"
+                );
                 return Err(Error::input(text).remedy(Remedy::DrawTrainingImages));
             }
             images.push(ImageRef { index, label });
         }
-        match classes.iter().find(|&&class| images.iter().all(|image| image.label != class)) {
+        match classes
+            .iter()
+            .find(|&&class| images.iter().all(|image| image.label != class))
+        {
             Some(class) => {
-                let text = format!("data.train_images: expected an image of class {class}, found none");
+                let text =
+                    format!("data.train_images: expected an image of class {class}, found none");
                 Err(Error::input(text).remedy(Remedy::DrawTrainingImages))
             }
             None => Ok(images),
@@ -104,10 +117,23 @@ impl TrainingImages {
         let images = TrainingImages::images(config, dataset)?;
         let seen = |image: &ImageRef| see(config, dataset, Split::Train, image.index);
         let stimuli: Vec<Grid<f64>> = images.iter().map(seen).collect::<Result<_, _>>()?;
-        let train_sha256 = dataset.fingerprint(Split::Train).expect("its images were read just now");
-        let dataset = DatasetRef { name: dataset.name().to_string(), train_sha256 };
-        let (stimuli, conditions) = config.objective().prepare(stimuli, &config.physics, config.seed);
-        Ok(TrainingImages { dataset, images, stimuli, conditions })
+        let train_sha256 = dataset
+            .fingerprint(Split::Train)
+            .expect("its images were read just now");
+        let dataset = DatasetRef {
+            name: dataset.name().to_string(),
+            train_sha256,
+        };
+        let (stimuli, conditions) =
+            config
+                .objective()
+                .prepare(stimuli, &config.physics, config.seed);
+        Ok(TrainingImages {
+            dataset,
+            images,
+            stimuli,
+            conditions,
+        })
     }
 
     /// Describes the images to the user, one by one if they are few.
@@ -138,7 +164,8 @@ mod tests {
     use crate::task::perturbation::of_response;
 
     /// Two classes of built-in digits, six images of each.
-    const CONFIG: &str = "[task]\ngroups = [[0], [1]]\n[data]\ndataset = \"builtin\"\nimages_per_class = 6\n";
+    const CONFIG: &str =
+        "[task]\ngroups = [[0], [1]]\n[data]\ndataset = \"builtin\"\nimages_per_class = 6\n";
 
     fn config(more: &str, set: &[&str]) -> Result<Config, Error> {
         let set: Vec<String> = set.iter().map(ToString::to_string).collect();
@@ -173,10 +200,17 @@ mod tests {
         }
         let all = 6.0 * changing as f64;
         for (seen, expected) in seen.into_iter().zip([0.4, 0.4, 0.2]) {
-            assert!((f64::from(seen) / all - expected).abs() < 0.1, "{seen} of {all}: expected {expected}");
+            assert!(
+                (f64::from(seen) / all - expected).abs() < 0.1,
+                "{seen} of {all}: expected {expected}"
+            );
         }
         assert!(changing > 20);
-        let opposites = |seed| GaitResponse.prepare(plain.stimuli.clone(), &Physics::default(), seed).0;
+        let opposites = |seed| {
+            GaitResponse
+                .prepare(plain.stimuli.clone(), &Physics::default(), seed)
+                .0
+        };
         assert_eq!(opposites(1), random.stimuli);
         assert_ne!(opposites(2), random.stimuli);
     }
@@ -198,25 +232,53 @@ mod tests {
     fn what_does_not_go_with_a_response_is_refused_with_its_key() {
         assert!(config(RESPONSE, &[]).is_ok());
         assert!(config(RESPONSE, &["data.images_per_class=4"]).is_ok());
-        assert!(config(RESPONSE, &["genome.voxel_mutations=0.5", "genome.voxel_changes=4"]).is_ok());
+        assert!(
+            config(
+                RESPONSE,
+                &["genome.voxel_mutations=0.5", "genome.voxel_changes=4"]
+            )
+            .is_ok()
+        );
         let refused = [
-            ("data.images_per_class=3", "data.images_per_class = 3", "8 or more"),
+            (
+                "data.images_per_class=3",
+                "data.images_per_class = 3",
+                "8 or more",
+            ),
             (
                 "data.train_images=[0, 1, 2, 3, 4, 5, 6, 7, 8]",
                 "data.train_images = 9 images",
                 "an even number",
             ),
-            ("protocol.rollout=\"sequential\"", "protocol.rollout = \"sequential\"", "\"fresh\""),
+            (
+                "protocol.rollout=\"sequential\"",
+                "protocol.rollout = \"sequential\"",
+                "\"fresh\"",
+            ),
         ];
         for (set, found, expected) in refused {
             let message = config(RESPONSE, &[set]).unwrap_err().message;
-            assert!(message.contains(found) && message.contains(expected), "{set}: {message}");
-            assert!(message.contains("evaluation.fitness = \"response\""), "{set}: {message}");
-            assert!(config("", &[set]).is_ok(), "{set}: it is no error by itself");
+            assert!(
+                message.contains(found) && message.contains(expected),
+                "{set}: {message}"
+            );
+            assert!(
+                message.contains("evaluation.fitness = \"response\""),
+                "{set}: {message}"
+            );
+            assert!(
+                config("", &[set]).is_ok(),
+                "{set}: it is no error by itself"
+            );
         }
         let splits = CONFIG.replace("groups = [[0], [1]]", "splits = [0, 1, 2]");
-        let message = Config::parse(&format!("{splits}{RESPONSE}"), "a.toml", &[]).unwrap_err().message;
-        assert!(message.contains("a.toml:2: task.splits = 3 tasks: "), "{message}");
+        let message = Config::parse(&format!("{splits}{RESPONSE}"), "a.toml", &[])
+            .unwrap_err()
+            .message;
+        assert!(
+            message.contains("a.toml:2: task.splits = 3 tasks: "),
+            "{message}"
+        );
         assert!(message.contains("one task, as groups"), "{message}");
     }
 }

@@ -47,7 +47,11 @@ pub struct Whereabouts {
 impl Whereabouts {
     /// Starts without a run; `data` is the folder from the command line.
     pub fn given(data: Option<&Path>) -> Self {
-        Whereabouts { data: data.map(Path::to_path_buf), remembered: Vec::new(), run_json: None }
+        Whereabouts {
+            data: data.map(Path::to_path_buf),
+            remembered: Vec::new(),
+            run_json: None,
+        }
     }
 
     /// Adds the folder that a run remembers, by its run.json or another file beside it.
@@ -61,7 +65,11 @@ impl Whereabouts {
     /// Adds the folder of a run that is resumed; a run that is replaced does not count.
     #[must_use]
     pub(crate) fn and_of_resumed(self, if_exists: IfExists, run_json: &Path) -> Self {
-        if if_exists == IfExists::Resume { self.and_of(run_json) } else { self }
+        if if_exists == IfExists::Resume {
+            self.and_of(run_json)
+        } else {
+            self
+        }
     }
 
     /// Adds the run.json that needs the images to an error.
@@ -80,18 +88,26 @@ impl Whereabouts {
         if config.dataset == BUILTIN {
             return Dataset::builtin(config.builtin.clone(), wanted).map_err(Error::from);
         }
-        let mut given = places(self.data.as_deref(), std::env::var_os("MORPHCOG_DATA"), None);
+        let mut given = places(
+            self.data.as_deref(),
+            std::env::var_os("MORPHCOG_DATA"),
+            None,
+        );
         let (there, gone) = match given.is_empty() {
             true => self.remembered(&config.dataset)?,
             false => (None, None),
         };
         given.extend(there);
         given.extend(places(None, None, config.dir.as_deref()));
-        Dataset::oriented(&config.dataset, &given, wanted, config.transpose).map_err(|error| match gone {
-            Some(gone) => Error::from(error)
-                .advice(format!("the images of this run were in {gone}, which is not there any more"))
-                .remedy(Remedy::NameData),
-            None => Error::from(error),
+        Dataset::oriented(&config.dataset, &given, wanted, config.transpose).map_err(|error| {
+            match gone {
+                Some(gone) => Error::from(error)
+                    .advice(format!(
+                        "the images of this run were in {gone}, which is not there any more"
+                    ))
+                    .remedy(Remedy::NameData),
+                None => Error::from(error),
+            }
         })
     }
 
@@ -109,7 +125,10 @@ impl Whereabouts {
         let load = |config: &DataConfig| -> Result<(Dataset, bool), Error> {
             let loaded = self.load(config, wanted)?;
             let of_training = match loaded.fingerprint(Split::Train) {
-                None => self.load(config, &[Split::Train]).ok().and_then(|set| set.fingerprint(Split::Train)),
+                None => self
+                    .load(config, &[Split::Train])
+                    .ok()
+                    .and_then(|set| set.fingerprint(Split::Train)),
                 known => known,
             };
             let is_it = of_training.is_none_or(|found| found == train_sha256);
@@ -121,7 +140,10 @@ impl Whereabouts {
         }
         // File names may imply another orientation than when the run was made: the hash decides.
         if config.transpose.is_none() && loaded.folder().is_some() {
-            let other = DataConfig { transpose: Some(!loaded.is_transposed()), ..config.clone() };
+            let other = DataConfig {
+                transpose: Some(!loaded.is_transposed()),
+                ..config.clone()
+            };
             if let Ok((loaded, true)) = load(&other) {
                 return Ok(loaded);
             }
@@ -140,13 +162,19 @@ impl Whereabouts {
         if config.dataset == BUILTIN || is_known {
             return None;
         }
-        let folder = config.dir.as_deref().map_or_else(|| default_folder(&config.dataset), home_expanded);
+        let folder = config
+            .dir
+            .as_deref()
+            .map_or_else(|| default_folder(&config.dataset), home_expanded);
         folder.is_dir().then_some(folder)
     }
 
     /// Returns the first remembered folder of a dataset that still exists, and the first that does
     /// not.
-    fn remembered(&self, dataset: &str) -> Result<(Option<DatasetPlace>, Option<DatasetPlace>), Error> {
+    fn remembered(
+        &self,
+        dataset: &str,
+    ) -> Result<(Option<DatasetPlace>, Option<DatasetPlace>), Error> {
         let mut gone = None;
         for path in self.remembered.iter().filter(|path| path.exists()) {
             let text = read_text(path).map_err(|error| Error::reading(path, &error))?;
@@ -156,8 +184,14 @@ impl Whereabouts {
             if found.dataset != dataset {
                 continue;
             }
-            let folder = path.parent().unwrap_or(Path::new("")).join(home_expanded(&found.folder));
-            let place = DatasetPlace { origin: name, path: folder };
+            let folder = path
+                .parent()
+                .unwrap_or(Path::new(""))
+                .join(home_expanded(&found.folder));
+            let place = DatasetPlace {
+                origin: name,
+                path: folder,
+            };
             match place.path.is_dir() {
                 true => return Ok((Some(place), None)),
                 false => _ = gone.get_or_insert(place),
@@ -196,7 +230,11 @@ pub(crate) fn remember(folder: &RunFolder, dataset: &Dataset) -> Result<(), Erro
 ///
 /// # Errors
 /// As [`Whereabouts::load`].
-pub fn load_dataset(config: &Config, data: Option<&Path>, wanted: &[Split]) -> Result<Dataset, Error> {
+pub fn load_dataset(
+    config: &Config,
+    data: Option<&Path>,
+    wanted: &[Split],
+) -> Result<Dataset, Error> {
     Whereabouts::given(data).load(&config.data, wanted)
 }
 
@@ -254,14 +292,21 @@ pub(crate) fn part_of_others(
         None => "other images, perhaps of another size".to_string(),
     };
     let part = config.stimulus.part(shown);
-    Some(format!("the robots were made for {others}; of these they see {part}"))
+    Some(format!(
+        "the robots were made for {others}; of these they see {part}"
+    ))
 }
 
 /// Returns an image as a robot of a config sees it.
 ///
 /// # Errors
 /// Returns an error if the image does not fit the body's size.
-pub fn see(config: &Config, dataset: &Dataset, split: Split, index: usize) -> Result<Grid<f64>, Error> {
+pub fn see(
+    config: &Config,
+    dataset: &Dataset,
+    split: Split,
+    index: usize,
+) -> Result<Grid<f64>, Error> {
     seen(&config.body, &config.stimulus, dataset, split, index)
 }
 
@@ -275,7 +320,10 @@ pub(crate) fn see_all(
     split: Split,
     images: &[ImageRef],
 ) -> Result<Vec<Grid<f64>>, Error> {
-    images.iter().map(|image| see(config, dataset, split, image.index)).collect()
+    images
+        .iter()
+        .map(|image| see(config, dataset, split, image.index))
+        .collect()
 }
 
 /// Returns an image as a robot of this size sees it.
@@ -289,6 +337,9 @@ pub(crate) fn seen(
     split: Split,
     index: usize,
 ) -> Result<Grid<f64>, Error> {
-    let image = dataset.image(split, index).map_err(|error| Error::input(error.to_string()))?;
-    stimulus(&image, height, width, params).map_err(|error| Error::input(format!("{}: {error}", error.key())))
+    let image = dataset
+        .image(split, index)
+        .map_err(|error| Error::input(error.to_string()))?;
+    stimulus(&image, height, width, params)
+        .map_err(|error| Error::input(format!("{}: {error}", error.key())))
 }

@@ -72,7 +72,9 @@ pub struct ArchiveStats {
 impl<S> Archive<S> {
     /// Makes an archive without elites.
     pub(crate) fn new() -> Self {
-        Archive { elites: BTreeMap::new() }
+        Archive {
+            elites: BTreeMap::new(),
+        }
     }
 
     /// Puts a solution into its cell if that is empty or its elite is strictly less fit.
@@ -80,11 +82,16 @@ impl<S> Archive<S> {
     /// # Errors
     /// Returns [`ArchiveError::Objective`] if the fitness is not finite.
     pub(crate) fn insert(&mut self, new: Elite<S>) -> Result<Insertion<S>, ArchiveError> {
-        let Elite { cell, objective, .. } = new;
+        let Elite {
+            cell, objective, ..
+        } = new;
         if !objective.is_finite() {
             return Err(ArchiveError::Objective { cell, objective });
         }
-        if self.objective(cell).is_some_and(|incumbent| objective <= incumbent) {
+        if self
+            .objective(cell)
+            .is_some_and(|incumbent| objective <= incumbent)
+        {
             return Ok(Insertion::Rejected);
         }
         let old = self.elites.insert(cell, new);
@@ -111,8 +118,11 @@ impl<S> Archive<S> {
 
     /// Returns the objective of the `count`-th fittest elite (from 1) of a kind, if it exists.
     pub(crate) fn nth_fittest(&self, count: usize, of: impl Fn(&S) -> bool) -> Option<f64> {
-        let mut objectives: Vec<f64> =
-            self.elites().filter(|e| of(&e.solution)).map(|e| e.objective).collect();
+        let mut objectives: Vec<f64> = self
+            .elites()
+            .filter(|e| of(&e.solution))
+            .map(|e| e.objective)
+            .collect();
         objectives.sort_by(|a, b| b.total_cmp(a));
         objectives.get(count.checked_sub(1)?).copied()
     }
@@ -139,7 +149,13 @@ impl<S> Archive<S> {
 
     /// Returns the fittest elite; the first cell wins a tie.
     pub(crate) fn best(&self) -> Option<&Elite<S>> {
-        self.elites().reduce(|best, e| if e.objective > best.objective { e } else { best })
+        self.elites().reduce(|best, e| {
+            if e.objective > best.objective {
+                e
+            } else {
+                best
+            }
+        })
     }
 
     /// Computes the figures of an archive with this many `possible` cells; `qd_offset` is pyribs'
@@ -147,8 +163,10 @@ impl<S> Archive<S> {
     pub fn stats(&self, possible: usize, qd_offset: f64) -> ArchiveStats {
         let (num_elites, cells) = (self.len(), possible.max(1) as f64);
         // (`sum` of nothing would be −0.)
-        let sum =
-            |term: fn(f64, f64) -> f64| self.elites().fold(0.0, |s, e| s + term(e.objective, qd_offset));
+        let sum = |term: fn(f64, f64) -> f64| {
+            self.elites()
+                .fold(0.0, |s, e| s + term(e.objective, qd_offset))
+        };
         let qd_score = sum(|objective, offset| objective - offset);
         let total = sum(|objective, _| objective);
         ArchiveStats {
@@ -195,7 +213,11 @@ mod tests {
     use proptest::prelude::*;
 
     fn elite(cell: usize, objective: f64, solution: char) -> Elite<char> {
-        Elite { cell, objective, solution }
+        Elite {
+            cell,
+            objective,
+            solution,
+        }
     }
 
     #[test]
@@ -204,16 +226,30 @@ mod tests {
         assert_eq!(archive.insert(elite(3, -1.0, 'a')), Ok(Insertion::New));
         assert_eq!(archive.insert(elite(3, -1.0, 'b')), Ok(Insertion::Rejected));
         let old = elite(3, -1.0, 'a');
-        assert_eq!(archive.insert(elite(3, 2.0, 'c')), Ok(Insertion::Improved { old }));
+        assert_eq!(
+            archive.insert(elite(3, 2.0, 'c')),
+            Ok(Insertion::Improved { old })
+        );
         assert_eq!(archive.insert(elite(3, 1.0, 'd')), Ok(Insertion::Rejected));
-        assert_eq!((archive.get(3), archive.len()), (Some(&elite(3, 2.0, 'c')), 1));
+        assert_eq!(
+            (archive.get(3), archive.len()),
+            (Some(&elite(3, 2.0, 'c')), 1)
+        );
     }
 
     #[test]
     fn the_fittest_of_each_kind_can_be_kept() {
-        let told =
-            [(5, 2.0, 'a'), (1, 2.0, 'a'), (2, 3.0, 'a'), (7, -1.0, 'b'), (8, 0.0, 'b'), (9, 9.0, 'c')];
-        let elites = told.map(|(cell, objective, kind)| elite(cell, objective, kind)).to_vec();
+        let told = [
+            (5, 2.0, 'a'),
+            (1, 2.0, 'a'),
+            (2, 3.0, 'a'),
+            (7, -1.0, 'b'),
+            (8, 0.0, 'b'),
+            (9, 9.0, 'c'),
+        ];
+        let elites = told
+            .map(|(cell, objective, kind)| elite(cell, objective, kind))
+            .to_vec();
         let kept = |count| {
             let mut archive = Archive::try_from(elites.clone()).unwrap();
             archive.retain_fittest(count, |kind| *kind);
@@ -225,14 +261,20 @@ mod tests {
         assert!(kept(0).is_empty());
         let archive = Archive::try_from(elites.clone()).unwrap();
         let nth = |count, kind| archive.nth_fittest(count, |k| *k == kind);
-        assert_eq!([nth(0, 'a'), nth(1, 'a'), nth(3, 'a'), nth(4, 'a')], [None, Some(3.0), Some(2.0), None]);
+        assert_eq!(
+            [nth(0, 'a'), nth(1, 'a'), nth(3, 'a'), nth(4, 'a')],
+            [None, Some(3.0), Some(2.0), None]
+        );
     }
 
     #[test]
     fn what_is_not_a_number_never_enters() {
         let mut archive = Archive::new();
         for objective in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            assert!(matches!(archive.insert(elite(0, objective, 'a')), Err(ArchiveError::Objective { .. })));
+            assert!(matches!(
+                archive.insert(elite(0, objective, 'a')),
+                Err(ArchiveError::Objective { .. })
+            ));
         }
         assert_eq!(archive.len(), 0);
     }
@@ -249,13 +291,22 @@ mod tests {
         let text = include_str!("../../tests/pyribs/stats.json");
         let cases: Vec<Case> = serde_json::from_str(text).unwrap();
         assert!(cases.len() > 3 && cases.iter().any(|case| case.stats.qd_score < 0.0));
-        for Case { cells, qd_score_offset, told, stats: theirs } in cases {
+        for Case {
+            cells,
+            qd_score_offset,
+            told,
+            stats: theirs,
+        } in cases
+        {
             let mut archive = Archive::new();
             for (cell, objective) in told {
                 archive.insert(elite(cell, objective, 'x')).unwrap();
             }
             let ours = archive.stats(cells, qd_score_offset);
-            assert_eq!((ours.num_elites, ours.obj_max), (theirs.num_elites, theirs.obj_max));
+            assert_eq!(
+                (ours.num_elites, ours.obj_max),
+                (theirs.num_elites, theirs.obj_max)
+            );
             assert_eq!(
                 (ours.coverage, ours.obj_mean.is_some()),
                 (theirs.coverage, theirs.obj_mean.is_some())
@@ -263,7 +314,10 @@ mod tests {
             // pyribs adds up in the order of insertion, we in the order of cells.
             let near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * (1.0 + b.abs());
             assert!(near(ours.qd_score, theirs.qd_score), "{ours:?} {theirs:?}");
-            assert!(near(ours.norm_qd_score, theirs.norm_qd_score), "{ours:?} {theirs:?}");
+            assert!(
+                near(ours.norm_qd_score, theirs.norm_qd_score),
+                "{ours:?} {theirs:?}"
+            );
             assert!(
                 near(ours.obj_mean.unwrap_or(0.0), theirs.obj_mean.unwrap_or(0.0)),
                 "{ours:?} {theirs:?}"
@@ -278,9 +332,16 @@ mod tests {
         archive.insert(elite(2, 0.5, 'a')).unwrap();
         let text = serde_json::to_string(&archive).unwrap();
         let first = r#"{"cell":2,"objective":0.5,"solution":"a"}"#;
-        assert_eq!(text, format!(r#"[{first},{{"cell":7,"objective":4.0,"solution":"b"}}]"#));
-        assert_eq!(serde_json::from_str::<Archive<char>>(&text).unwrap(), archive);
-        let twice = serde_json::from_str::<Archive<char>>(&format!("[{first},{first}]")).unwrap_err();
+        assert_eq!(
+            text,
+            format!(r#"[{first},{{"cell":7,"objective":4.0,"solution":"b"}}]"#)
+        );
+        assert_eq!(
+            serde_json::from_str::<Archive<char>>(&text).unwrap(),
+            archive
+        );
+        let twice =
+            serde_json::from_str::<Archive<char>>(&format!("[{first},{first}]")).unwrap_err();
         assert!(twice.to_string().contains("cell 2 holds two"), "{twice}");
     }
 

@@ -37,7 +37,9 @@ impl DescriptorSpace {
             return None;
         }
         let mut paired = coordinates.iter().zip(&self.dimensions);
-        paired.try_fold(0, |index, (c, (_, bins))| (c < bins).then(|| index * bins + c))
+        paired.try_fold(0, |index, (c, (_, bins))| {
+            (c < bins).then(|| index * bins + c)
+        })
     }
 
     /// Returns the coordinates of a cell, `None` if no cell has this index.
@@ -78,7 +80,11 @@ pub(crate) fn possible_cells(area: usize, min_muscles: usize, tasks: usize) -> V
     // Least and largest count in a bin, if there is one: the last bin takes the remainder.
     let range = |bin: usize, least: usize| {
         let first = (bin * width).max(least);
-        let last = if bin == COUNT_BINS - 1 { area } else { ((bin + 1) * width - 1).min(area) };
+        let last = if bin == COUNT_BINS - 1 {
+            area
+        } else {
+            ((bin + 1) * width - 1).min(area)
+        };
         (first <= last).then_some((first, last))
     };
     (0..space.len())
@@ -121,9 +127,22 @@ mod tests {
     #[test]
     fn the_last_dimension_runs_fastest() {
         let space = DescriptorSpace::new(vec![("a".into(), 2), ("b".into(), 3)]);
-        assert_eq!((space.index(&[0, 2]), space.index(&[1, 0])), (Some(2), Some(3)));
-        assert_eq!((space.index(&[2, 0]), space.index(&[0]), space.coordinates(6)), (None, None, None));
-        assert_eq!(DescriptorSpace::voxel_counts(7).dimensions()[3], ("task".to_string(), 7));
+        assert_eq!(
+            (space.index(&[0, 2]), space.index(&[1, 0])),
+            (Some(2), Some(3))
+        );
+        assert_eq!(
+            (
+                space.index(&[2, 0]),
+                space.index(&[0]),
+                space.coordinates(6)
+            ),
+            (None, None, None)
+        );
+        assert_eq!(
+            DescriptorSpace::voxel_counts(7).dimensions()[3],
+            ("task".to_string(), 7)
+        );
     }
 
     proptest! {

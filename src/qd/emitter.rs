@@ -21,7 +21,11 @@ pub struct EmitterParams {
 impl Default for EmitterParams {
     fn default() -> Self {
         let initial = NonZeroU16::MIN.saturating_add(19);
-        EmitterParams { initial, parents: 20, random_immigrants: 0 }
+        EmitterParams {
+            initial,
+            parents: 20,
+            random_immigrants: 0,
+        }
     }
 }
 
@@ -63,10 +67,20 @@ impl EmitterParams {
         let cells: Vec<usize> = archive.elites().map(|e| e.cell).collect();
         let mut rng = stream(seed, Purpose::Parents, generation, 0);
         let drawn = rng.sample(cells.len(), usize::from(self.parents));
-        let random_immigrants = if cells.is_empty() { self.initial.get() } else { self.random_immigrants };
+        let random_immigrants = if cells.is_empty() {
+            self.initial.get()
+        } else {
+            self.random_immigrants
+        };
         let parents = drawn.into_iter().map(|i| Some(cells[i]));
         let all = parents.chain((0..random_immigrants).map(|_| None));
-        all.zip(0..).map(|(parent, child)| Proposal { generation, child, parent }).collect()
+        all.zip(0..)
+            .map(|(parent, child)| Proposal {
+                generation,
+                child,
+                parent,
+            })
+            .collect()
     }
 }
 
@@ -76,8 +90,14 @@ mod tests {
     use crate::qd::archive::Elite;
 
     fn archive(cells: impl IntoIterator<Item = usize>) -> Archive<()> {
-        let elites: Vec<_> =
-            cells.into_iter().map(|cell| Elite { cell, objective: 0.0, solution: () }).collect();
+        let elites: Vec<_> = cells
+            .into_iter()
+            .map(|cell| Elite {
+                cell,
+                objective: 0.0,
+                solution: (),
+            })
+            .collect();
         elites.try_into().unwrap()
     }
 
@@ -86,15 +106,26 @@ mod tests {
         for generation in [0, 1, 2] {
             let asked = EmitterParams::default().ask(&archive([]), 1, generation);
             assert_eq!(asked.len(), 20);
-            assert!(asked.iter().all(|p| p.parent.is_none() && p.generation == generation));
+            assert!(
+                asked
+                    .iter()
+                    .all(|p| p.parent.is_none() && p.generation == generation)
+            );
         }
     }
 
     #[test]
     fn parents_are_different_elites_and_random_immigrants_come_after() {
-        let params = EmitterParams { parents: 5, random_immigrants: 2, ..EmitterParams::default() };
+        let params = EmitterParams {
+            parents: 5,
+            random_immigrants: 2,
+            ..EmitterParams::default()
+        };
         let asked = params.ask(&archive((0..90).map(|i| 3 * i)), 1, 4);
-        assert_eq!(asked.iter().map(|p| p.child).collect::<Vec<_>>(), [0, 1, 2, 3, 4, 5, 6]);
+        assert_eq!(
+            asked.iter().map(|p| p.child).collect::<Vec<_>>(),
+            [0, 1, 2, 3, 4, 5, 6]
+        );
         let mut parents: Vec<usize> = asked.iter().filter_map(|p| p.parent).collect();
         parents.sort_unstable();
         parents.dedup();
@@ -119,9 +150,17 @@ mod tests {
 
     #[test]
     fn sizes_in_files_have_the_papers_defaults_and_are_checked() {
-        let read = |text: &str| serde_json::from_str::<EmitterParams>(text).map_err(|e| e.to_string());
+        let read =
+            |text: &str| serde_json::from_str::<EmitterParams>(text).map_err(|e| e.to_string());
         let params = read("{}").unwrap();
-        assert_eq!((params.initial.get(), params.parents, params.random_immigrants), (20, 20, 0));
+        assert_eq!(
+            (
+                params.initial.get(),
+                params.parents,
+                params.random_immigrants
+            ),
+            (20, 20, 0)
+        );
         assert!(read(r#"{"initial": 0}"#).unwrap_err().contains("nonzero"));
         assert!(read(r#"{"parent": 5}"#).unwrap_err().contains("parent"));
     }

@@ -31,7 +31,11 @@ pub(crate) struct Evaluated<S> {
 impl<S> MapElites<S> {
     /// Starts a search with an archive, or continues one.
     pub(crate) fn new(seed: u64, params: EmitterParams, archive: Archive<S>) -> Self {
-        MapElites { seed, params, archive }
+        MapElites {
+            seed,
+            params,
+            archive,
+        }
     }
 
     /// Returns the archive of the elites found so far.
@@ -53,8 +57,16 @@ impl<S> MapElites<S> {
     ///
     /// # Errors
     /// Returns the variation's error.
-    pub(crate) fn make<V: Variation<S>>(&self, proposal: Proposal, variation: &V) -> Result<S, V::Error> {
-        let Proposal { generation, child, parent } = proposal;
+    pub(crate) fn make<V: Variation<S>>(
+        &self,
+        proposal: Proposal,
+        variation: &V,
+    ) -> Result<S, V::Error> {
+        let Proposal {
+            generation,
+            child,
+            parent,
+        } = proposal;
         match parent.and_then(|cell| self.archive.get(cell)) {
             Some(elite) => variation.offspring(&elite.solution, generation, child),
             None => variation.random_immigrant(generation, child),
@@ -71,9 +83,23 @@ impl<S> MapElites<S> {
         mut generation: Vec<Evaluated<S>>,
     ) -> Result<Vec<(u64, Insertion<S>)>, ArchiveError> {
         generation.sort_by_key(|e| e.child);
-        let told = generation.into_iter().map(|Evaluated { child, cell, objective, solution }| {
-            Ok((child, self.archive.insert(Elite { cell, objective, solution })?))
-        });
+        let told = generation.into_iter().map(
+            |Evaluated {
+                 child,
+                 cell,
+                 objective,
+                 solution,
+             }| {
+                Ok((
+                    child,
+                    self.archive.insert(Elite {
+                        cell,
+                        objective,
+                        solution,
+                    })?,
+                ))
+            },
+        );
         told.collect()
     }
 }
@@ -100,7 +126,12 @@ mod tests {
 
     fn evaluated(proposal: &Proposal, solution: f64) -> Evaluated<f64> {
         let cell = (solution.abs() * 4.0) as usize % 10;
-        Evaluated { child: proposal.child, cell, objective: (solution * 7.0).sin(), solution }
+        Evaluated {
+            child: proposal.child,
+            cell,
+            objective: (solution * 7.0).sin(),
+            solution,
+        }
     }
 
     fn search(generations: u64, parallel: bool) -> Archive<f64> {
@@ -128,10 +159,17 @@ mod tests {
     #[test]
     fn a_search_goes_on_from_a_stored_archive_as_if_it_never_stopped() {
         let text = serde_json::to_string(&search(50, false)).unwrap();
-        let mut resumed = MapElites::new(1, EmitterParams::default(), serde_json::from_str(&text).unwrap());
+        let mut resumed = MapElites::new(
+            1,
+            EmitterParams::default(),
+            serde_json::from_str(&text).unwrap(),
+        );
         for generation in 50..100 {
             let asked = resumed.ask(generation);
-            let made = asked.iter().map(|p| evaluated(p, resumed.make(*p, &Walk).unwrap())).collect();
+            let made = asked
+                .iter()
+                .map(|p| evaluated(p, resumed.make(*p, &Walk).unwrap()))
+                .collect();
             resumed.tell(made).unwrap();
         }
         assert_eq!(resumed.archive, search(100, false));
@@ -140,11 +178,21 @@ mod tests {
     #[test]
     fn the_first_child_keeps_the_cell_against_an_equal() {
         let mut search = MapElites::new(1, EmitterParams::default(), Archive::new());
-        let child = |child, solution| Evaluated { child, cell: 0, objective: 1.0, solution };
+        let child = |child, solution| Evaluated {
+            child,
+            cell: 0,
+            objective: 1.0,
+            solution,
+        };
         let told = search.tell(vec![child(1, 'b'), child(0, 'a')]).unwrap();
         assert_eq!(told, [(0, Insertion::New), (1, Insertion::Rejected)]);
         assert_eq!(search.archive().get(0).unwrap().solution, 'a');
-        let error = Evaluated { child: 2, cell: 0, objective: f64::NAN, solution: 'c' };
+        let error = Evaluated {
+            child: 2,
+            cell: 0,
+            objective: f64::NAN,
+            solution: 'c',
+        };
         assert!(search.tell(vec![error]).is_err());
     }
 }

@@ -86,7 +86,10 @@ pub(crate) fn teachable(
         estimates.push(other.judged(&design, scatter, threshold));
     }
     let of = |which: usize| Estimate::mean([estimates[0][which], estimates[1][which]]);
-    Ok(Some(Trainability { fitness: of(0), accuracy: of(1) }))
+    Ok(Some(Trainability {
+        fitness: of(0),
+        accuracy: of(1),
+    }))
 }
 
 /// One half of the rollouts and of the examples.
@@ -125,7 +128,13 @@ impl<'a> Half<'a> {
             let rollouts = own.len() as f64;
             let mean = own.iter().map(|shown| shown.displacement).sum::<f64>() / rollouts;
             let examples = examples.iter().skip(number).step_by(2).collect();
-            Some(Half { response: Response::of(own)?, rollouts, widths, mean, examples })
+            Some(Half {
+                response: Response::of(own)?,
+                rollouts,
+                widths,
+                mean,
+                examples,
+            })
         };
         Some([half(0)?, half(1)?])
     }
@@ -133,7 +142,9 @@ impl<'a> Half<'a> {
     /// Returns the best design by the slopes of this half, and its side: 1 if it walks right for
     /// examples whose `right` is 1, −1 if it walks left for them.
     fn solved(&self, seed: u64, number: u64) -> Solved {
-        let Response { slopes, intercept, .. } = &self.response;
+        let Response {
+            slopes, intercept, ..
+        } = &self.response;
         let any = vec![Material::SensorExpand; slopes.len()];
         let solved = |side: f64, draw: u64| {
             let examples = self.examples.iter().map(|example| (*example, *intercept));
@@ -142,7 +153,11 @@ impl<'a> Half<'a> {
             (lesson.objective(), lesson.design())
         };
         let (right, left) = (solved(1.0, 0), solved(-1.0, 1));
-        if right.0 >= left.0 { (right.1, 1.0) } else { (left.1, -1.0) }
+        if right.0 >= left.0 {
+            (right.1, 1.0)
+        } else {
+            (left.1, -1.0)
+        }
     }
 
     /// Returns the mean clipped margin of a design's answers, and the fraction that are correct.
@@ -150,16 +165,25 @@ impl<'a> Half<'a> {
         let total: f64 = self.examples.iter().map(|example| example.weight).sum();
         let fit = self.response.evidence.least_biased();
         let answer = |example: &&Example| {
-            let off: Vec<f64> =
-                example.widths(design).iter().zip(&self.widths).map(|(width, mean)| width - mean).collect();
-            let moved: f64 = off.iter().zip(&fit.slopes).map(|(off, slope)| off * slope).sum();
+            let off: Vec<f64> = example
+                .widths(design)
+                .iter()
+                .zip(&self.widths)
+                .map(|(width, mean)| width - mean)
+                .collect();
+            let moved: f64 = off
+                .iter()
+                .zip(&fit.slopes)
+                .map(|(off, slope)| off * slope)
+                .sum();
             let noise = fit.variance(&off, self.response.ridge).1 + 1.0 / self.rollouts;
             let right = side * example.right;
             Answer {
                 weight: example.weight / total,
                 right,
                 margin: right * (self.mean + moved),
-                scatter: (scatter * (1.0 - noise).max(LEAST_SCATTER * LEAST_SCATTER).sqrt()).max(NONE),
+                scatter: (scatter * (1.0 - noise).max(LEAST_SCATTER * LEAST_SCATTER).sqrt())
+                    .max(NONE),
                 off,
             }
         };
@@ -167,7 +191,9 @@ impl<'a> Half<'a> {
         let estimate = |judged: &dyn Fn(&Answer) -> (f64, f64)| {
             let found: Vec<(f64, f64)> = answers.iter().map(judged).collect();
             let pairs = || answers.iter().zip(&found);
-            let value: f64 = pairs().map(|(answer, (clipped, _))| answer.weight * clipped).sum();
+            let value: f64 = pairs()
+                .map(|(answer, (clipped, _))| answer.weight * clipped)
+                .sum();
             // Variance over other images.
             let by_images = pairs().map(|(answer, (clipped, _))| answer.weight * (clipped - value));
             let by_images: f64 = by_images.map(|off| off * off).sum();
@@ -176,12 +202,19 @@ impl<'a> Half<'a> {
             for (answer, (_, growth)) in pairs() {
                 let change = answer.weight * answer.right * growth;
                 of_mean += change;
-                of_slopes.iter_mut().zip(&answer.off).for_each(|(sum, off)| *sum += change * off);
+                of_slopes
+                    .iter_mut()
+                    .zip(&answer.off)
+                    .for_each(|(sum, off)| *sum += change * off);
             }
             let by_rollouts = scatter
                 * scatter
-                * (fit.variance(&of_slopes, self.response.ridge).0 + of_mean * of_mean / self.rollouts);
-            Estimate { value, error: (by_images + by_rollouts).sqrt() }
+                * (fit.variance(&of_slopes, self.response.ridge).0
+                    + of_mean * of_mean / self.rollouts);
+            Estimate {
+                value,
+                error: (by_images + by_rollouts).sqrt(),
+            }
         };
         [
             estimate(&|answer| expected_clipped_margin(answer.margin, answer.scatter, ENOUGH)),
@@ -208,7 +241,8 @@ fn expected_clipped_margin(margin: f64, scatter: f64, enough: f64) -> (f64, f64)
     let [low, high] = [-enough, enough].map(|end| (end - margin) / scatter);
     let [below, under] = [low, high].map(normal);
     let inside = under - below;
-    let clipped = enough * (1.0 - under - below) + margin * inside + scatter * (density(low) - density(high));
+    let clipped =
+        enough * (1.0 - under - below) + margin * inside + scatter * (density(low) - density(high));
     (clipped / enough, inside / enough)
 }
 
@@ -254,25 +288,41 @@ mod tests {
             let body: Body = "6".repeat(places).parse().unwrap();
             let mut random = stream(seed, Purpose::RandomImages, 9, 0);
             let slopes = (0..places).map(|_| slope * random.normal()).collect();
-            Planted { gait: Gait::of(&body).unwrap(), slopes, noise, random }
+            Planted {
+                gait: Gait::of(&body).unwrap(),
+                slopes,
+                noise,
+                random,
+            }
         }
 
         fn walks(&self, widths: &[f64], condition: usize) -> f64 {
-            let moved: f64 =
-                widths.iter().zip(&self.slopes).map(|(width, slope)| (width - 1.1) * slope).sum();
+            let moved: f64 = widths
+                .iter()
+                .zip(&self.slopes)
+                .map(|(width, slope)| (width - 1.1) * slope)
+                .sum();
             moved + [2.0, -2.0][condition]
         }
 
         fn shown(&mut self, count: usize) -> Vec<RandomRollout> {
             let rollout = |number: usize| {
-                let widths: Vec<f64> =
-                    self.slopes.iter().map(|_| if self.random.unit() < 0.4 { 1.6 } else { 0.6 }).collect();
+                let widths: Vec<f64> = self
+                    .slopes
+                    .iter()
+                    .map(|_| if self.random.unit() < 0.4 { 1.6 } else { 0.6 })
+                    .collect();
                 (widths, number % 2)
             };
             let all: Vec<_> = (0..count).map(rollout).collect();
             let scattered = |(widths, condition): (Vec<f64>, usize)| {
-                let displacement = self.walks(&widths, condition) + self.noise * self.random.normal();
-                RandomRollout { displacement, widths, condition }
+                let displacement =
+                    self.walks(&widths, condition) + self.noise * self.random.normal();
+                RandomRollout {
+                    displacement,
+                    widths,
+                    condition,
+                }
             };
             all.into_iter().map(scattered).collect()
         }
@@ -281,10 +331,20 @@ mod tests {
         fn examples(&mut self, count: usize) -> Vec<Example> {
             let example = |number: usize| {
                 let right = if number < count / 2 { 1.0 } else { -1.0 };
-                let bright = |c: usize| 0.5 + if c.is_multiple_of(2) { 0.1 * right } else { -0.1 * right };
-                let pixel = |_: usize, c: usize| f64::from(u8::from(self.random.unit() < bright(c)));
+                let bright = |c: usize| {
+                    0.5 + if c.is_multiple_of(2) {
+                        0.1 * right
+                    } else {
+                        -0.1 * right
+                    }
+                };
+                let pixel =
+                    |_: usize, c: usize| f64::from(u8::from(self.random.unit() < bright(c)));
                 let image = Grid::from_fn(1, self.slopes.len(), pixel);
-                Example { right, ..Example::new(&self.gait, &image, &Physics::default()) }
+                Example {
+                    right,
+                    ..Example::new(&self.gait, &image, &Physics::default())
+                }
             };
             (0..count).map(example).collect()
         }
@@ -296,7 +356,8 @@ mod tests {
                 // Either condition in turn, whose effect is their mean's.
                 let walks = [0, 1].map(|condition| self.walks(&example.widths(design), condition));
                 let margin = side * example.right * (walks[0] + walks[1]) / 2.0;
-                clipped += expected_clipped_margin(margin, self.noise, ENOUGH).0 / examples.len() as f64;
+                clipped +=
+                    expected_clipped_margin(margin, self.noise, ENOUGH).0 / examples.len() as f64;
                 share += right(margin, self.noise, THRESHOLD).0 / examples.len() as f64;
             }
             [clipped, share]
@@ -305,10 +366,18 @@ mod tests {
 
     #[test]
     fn an_expected_clipped_margin_is_the_mean_of_clipped_margins_and_grows_as_it_says() {
-        for (margin, scatter) in [(0.0, 1.0), (4.0, 3.0), (-12.0, 5.0), (9.0, 20.0), (30.0, 2.0)] {
+        for (margin, scatter) in [
+            (0.0, 1.0),
+            (4.0, 3.0),
+            (-12.0, 5.0),
+            (9.0, 20.0),
+            (30.0, 2.0),
+        ] {
             let steps = || (0..20_000).map(|k| -10.0 + 0.001 * (f64::from(k) + 0.5));
             let mean = |of: &dyn Fn(f64) -> f64| -> f64 {
-                steps().map(|x| 0.001 * density(x) * of(margin + scatter * x)).sum()
+                steps()
+                    .map(|x| 0.001 * density(x) * of(margin + scatter * x))
+                    .sum()
             };
             let (clipped, slope) = expected_clipped_margin(margin, scatter, 10.0);
             assert!(
@@ -331,8 +400,16 @@ mod tests {
             let mut planted = Planted::new(40, 4.0, 6.0, seed);
             let (shown, examples) = (planted.shown(240), planted.examples(400));
             let scatter = Response::of(&shown).unwrap().scatter;
-            let found =
-                teachable(&shown, scatter, &examples, THRESHOLD, seed, &Session::default()).unwrap().unwrap();
+            let found = teachable(
+                &shown,
+                scatter,
+                &examples,
+                THRESHOLD,
+                seed,
+                &Session::default(),
+            )
+            .unwrap()
+            .unwrap();
             let halves = Half::both(&shown, &examples).unwrap();
             let others = planted.examples(2000);
             let truths = [0, 1].map(|half| {
@@ -357,26 +434,50 @@ mod tests {
         for seed in 0..20 {
             let mut planted = Planted::new(40, 0.0, 6.0, seed);
             let (shown, examples) = (planted.shown(200), planted.examples(200));
-            let found =
-                teachable(&shown, 6.0, &examples, THRESHOLD, seed, &Session::default()).unwrap().unwrap();
+            let found = teachable(&shown, 6.0, &examples, THRESHOLD, seed, &Session::default())
+                .unwrap()
+                .unwrap();
             fitness += found.fitness.value / 20.0;
             let [low, high] = found.fitness.interval();
             inside += usize::from(low <= 0.0 && 0.0 <= high);
             let half = &Half::both(&shown, &examples).unwrap()[0];
             naive += half.judged(&half.solved(seed, 0), 6.0, THRESHOLD)[0].value / 20.0;
         }
-        assert!(fitness.abs() < 0.04 && naive > 0.2 && inside >= 17, "{fitness} {naive} {inside}");
+        assert!(
+            fitness.abs() < 0.04 && naive > 0.2 && inside >= 17,
+            "{fitness} {naive} {inside}"
+        );
     }
 
     #[test]
     fn a_few_rollouts_say_nothing() {
         let mut planted = Planted::new(5, 1.0, 1.0, 1);
         let (shown, examples) = (planted.shown(19), planted.examples(20));
-        assert_eq!(teachable(&shown, 1.0, &examples, THRESHOLD, 1, &Session::default()), Ok(None));
-        assert_eq!(teachable(&[], 1.0, &examples, THRESHOLD, 1, &Session::default()), Ok(None));
+        assert_eq!(
+            teachable(&shown, 1.0, &examples, THRESHOLD, 1, &Session::default()),
+            Ok(None)
+        );
+        assert_eq!(
+            teachable(&[], 1.0, &examples, THRESHOLD, 1, &Session::default()),
+            Ok(None)
+        );
         let enough = planted.shown(20);
-        assert!(teachable(&enough, 1.0, &examples, THRESHOLD, 1, &Session::default()).unwrap().is_some());
+        assert!(
+            teachable(&enough, 1.0, &examples, THRESHOLD, 1, &Session::default())
+                .unwrap()
+                .is_some()
+        );
         let stop = AtomicBool::new(true);
-        assert_eq!(teachable(&enough, 1.0, &examples, THRESHOLD, 1, &Session::new(&stop, &())), Err(Stopped));
+        assert_eq!(
+            teachable(
+                &enough,
+                1.0,
+                &examples,
+                THRESHOLD,
+                1,
+                &Session::new(&stop, &())
+            ),
+            Err(Stopped)
+        );
     }
 }

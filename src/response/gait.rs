@@ -7,7 +7,11 @@ use crate::sim::{Physics, width};
 use std::ops::Range;
 
 /// Materials that a place can have without changing the gait.
-pub(crate) const CHOICES: [Material; 3] = [Material::Soft, Material::SensorExpand, Material::SensorShrink];
+pub(crate) const CHOICES: [Material; 3] = [
+    Material::Soft,
+    Material::SensorExpand,
+    Material::SensorShrink,
+];
 
 /// Materials that a [design problem](super::lesson) chooses from: sensors. A response is measured
 /// with sensors at all places, so it does not cover soft voxels. A soft voxel differs from a sensor
@@ -37,9 +41,16 @@ impl Gait {
     /// Returns the gait of a body; `None` if it has neither soft voxels nor sensors.
     pub fn of(body: &Body) -> Option<Self> {
         let is_place = |material: &Material| CHOICES.contains(material);
-        let places: Vec<_> =
-            body.voxels().iter().filter(|(_, m)| is_place(m)).map(|(place, _)| place).collect();
-        (!places.is_empty()).then(|| Gait { body: body.clone(), places })
+        let places: Vec<_> = body
+            .voxels()
+            .iter()
+            .filter(|(_, m)| is_place(m))
+            .map(|(place, _)| place)
+            .collect();
+        (!places.is_empty()).then(|| Gait {
+            body: body.clone(),
+            places,
+        })
     }
 
     /// Returns the (row, column) of each soft voxel and sensor, row-major.
@@ -49,7 +60,10 @@ impl Gait {
 
     /// Returns the materials at the places of its own body.
     pub(crate) fn design(&self) -> Design {
-        self.places.iter().map(|place| self.body.voxels()[*place]).collect()
+        self.places
+            .iter()
+            .map(|place| self.body.voxels()[*place])
+            .collect()
     }
 
     /// Builds the body with these materials at its places.
@@ -57,7 +71,11 @@ impl Gait {
     /// # Panics
     /// If the design does not have one material for each place.
     pub(crate) fn built(&self, design: &[Material]) -> Body {
-        assert_eq!(design.len(), self.places.len(), "a design has one material for each place");
+        assert_eq!(
+            design.len(),
+            self.places.len(),
+            "a design has one material for each place"
+        );
         let mut voxels = self.body.voxels().clone();
         for (place, material) in self.places.iter().zip(design) {
             voxels[*place] = *material;
@@ -92,7 +110,12 @@ impl Gait {
     }
 
     /// Returns the target width of each place under an image \[rest widths\].
-    pub(crate) fn widths(&self, design: &[Material], stimulus: &Grid<f64>, physics: &Physics) -> Vec<f64> {
+    pub(crate) fn widths(
+        &self,
+        design: &[Material],
+        stimulus: &Grid<f64>,
+        physics: &Physics,
+    ) -> Vec<f64> {
         let width = |(place, material): (&(usize, usize), &Material)| {
             width(*material, stimulus.or_default(*place), physics)
         };
@@ -104,12 +127,21 @@ impl Gait {
 fn resting(physics: &Physics) -> f64 {
     let [narrow, wide] = [0.0, 1.0].map(|pixel| width(Material::SensorExpand, pixel, physics));
     let rest = width(Material::Soft, 0.0, physics);
-    if wide > narrow { ((rest - narrow) / (wide - narrow)).clamp(0.0, 1.0) } else { 0.0 }
+    if wide > narrow {
+        ((rest - narrow) / (wide - narrow)).clamp(0.0, 1.0)
+    } else {
+        0.0
+    }
 }
 
 /// Draws an image under which each place of a probe is, independently of all others, as wide as
 /// possible (with probability 0.4), as narrow as possible (0.4), or at rest (0.2).
-pub(crate) fn random_image(height: usize, width: usize, physics: &Physics, random: &mut Stream) -> Grid<f64> {
+pub(crate) fn random_image(
+    height: usize,
+    width: usize,
+    physics: &Physics,
+    random: &mut Stream,
+) -> Grid<f64> {
     let rest = resting(physics);
     Grid::from_fn(height, width, |_, _| {
         let drawn = random.unit();
@@ -140,7 +172,10 @@ mod tests {
         assert_eq!(gait.built(&gait.design()), body);
         assert_eq!(gait.probe(), "6636/3104".parse().unwrap());
         let image = Grid::from_fn(2, 4, |_, column| if column == 1 { 1.0 } else { 0.25 });
-        assert_eq!(gait.widths(&gait.design(), &image, &Physics::default()), [1.0, 1.6, 1.35]);
+        assert_eq!(
+            gait.widths(&gait.design(), &image, &Physics::default()),
+            [1.0, 1.6, 1.35]
+        );
         assert_eq!(Gait::of(&"3/1".parse().unwrap()), None);
     }
 
@@ -149,7 +184,11 @@ mod tests {
         let physics = Physics::default();
         let mut random = random(0);
         let gait = Gait::of(&"65".parse().unwrap()).unwrap();
-        let rest = gait.widths(&[Material::Soft; 2], &Grid::from_fn(1, 2, |_, _| 0.0), &physics)[0];
+        let rest = gait.widths(
+            &[Material::Soft; 2],
+            &Grid::from_fn(1, 2, |_, _| 0.0),
+            &physics,
+        )[0];
         let drawn: Vec<Vec<f64>> = (0..4000)
             .map(|_| {
                 let image = random_image(1, 2, &physics, &mut random);
@@ -162,7 +201,10 @@ mod tests {
         for (width, expected) in [(1.6, 0.4), (0.6, 0.4), (rest, 0.2)] {
             for place in 0..2 {
                 let share = share(&|widths| (widths[place] - width).abs() < 1e-9);
-                assert!((share - expected).abs() < 0.03, "{width} at {place}: {share}");
+                assert!(
+                    (share - expected).abs() < 0.03,
+                    "{width} at {place}: {share}"
+                );
             }
         }
         let both = share(&|widths| widths.iter().all(|width| (width - 1.6).abs() < 1e-9));
@@ -175,7 +217,11 @@ mod tests {
         let image = Grid::from_fn(2, 3, |row, column| 0.1 * (3 * row + column) as f64);
         let mut random = random(3);
         for _ in 0..30 {
-            let design: Design = gait.places().iter().map(|_| CHOICES[random.below(3)]).collect();
+            let design: Design = gait
+                .places()
+                .iter()
+                .map(|_| CHOICES[random.below(3)])
+                .collect();
             let probe = Gait::of(&gait.probe_of(&design)).unwrap().design();
             let is_soft = |material: &Material| *material == Material::Soft;
             assert!(probe.iter().map(is_soft).eq(design.iter().map(is_soft)));
@@ -185,7 +231,10 @@ mod tests {
                 gait.widths(&design, &image, &Physics::default()),
             );
             assert!(
-                found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12),
+                found
+                    .iter()
+                    .zip(&expected)
+                    .all(|(a, b)| (a - b).abs() < 1e-12),
                 "{found:?} {expected:?}"
             );
         }

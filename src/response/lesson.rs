@@ -48,7 +48,11 @@ impl Example {
 
     /// Returns the target width of each place of a design under it \[rest widths\].
     pub(crate) fn widths(&self, design: &[Material]) -> Vec<f64> {
-        self.choices.iter().zip(design).map(|(widths, material)| widths[choice(*material)]).collect()
+        self.choices
+            .iter()
+            .zip(design)
+            .map(|(widths, material)| widths[choice(*material)])
+            .collect()
     }
 }
 
@@ -56,7 +60,10 @@ impl Example {
 const WORST: f64 = -1.0;
 
 fn choice(material: Material) -> usize {
-    CHOICES.iter().position(|other| *other == material).expect("a design has materials of CHOICES only")
+    CHOICES
+        .iter()
+        .position(|other| *other == material)
+        .expect("a design has materials of CHOICES only")
 }
 
 /// A design problem: examples, first design, and slopes that predict displacements of others.
@@ -77,15 +84,24 @@ pub(crate) struct DesignProblem {
 impl DesignProblem {
     /// Makes a problem whose examples have the displacements of `design`.
     pub(crate) fn new(examples: &[&Example], slopes: &[f64], design: &[Material]) -> Self {
-        let column =
-            |place: usize, choice: usize| examples.iter().map(|e| e.choices[place][choice]).collect();
+        let column = |place: usize, choice: usize| {
+            examples.iter().map(|e| e.choices[place][choice]).collect()
+        };
         let total: f64 = examples.iter().map(|example| example.weight).sum();
         let mut lesson = DesignProblem {
-            widths: (0..slopes.len()).map(|place| [0, 1, 2].map(|choice| column(place, choice))).collect(),
+            widths: (0..slopes.len())
+                .map(|place| [0, 1, 2].map(|choice| column(place, choice)))
+                .collect(),
             slopes: slopes.to_vec(),
-            margins: examples.iter().map(|example| example.displacement * example.right).collect(),
+            margins: examples
+                .iter()
+                .map(|example| example.displacement * example.right)
+                .collect(),
             right: examples.iter().map(|example| example.right).collect(),
-            weights: examples.iter().map(|example| example.weight / total).collect(),
+            weights: examples
+                .iter()
+                .map(|example| example.weight / total)
+                .collect(),
             floor: WORST,
             design: design.iter().map(|material| choice(*material)).collect(),
             objective: 0.0,
@@ -114,7 +130,8 @@ impl DesignProblem {
 
     /// Computes the objective from scratch.
     fn count(&mut self) {
-        let clipped = |(margin, weight): (&f64, &f64)| weight * (margin / ENOUGH).clamp(self.floor, 1.0);
+        let clipped =
+            |(margin, weight): (&f64, &f64)| weight * (margin / ENOUGH).clamp(self.floor, 1.0);
         self.objective = self.margins.iter().zip(&self.weights).map(clipped).sum();
     }
 
@@ -136,7 +153,8 @@ impl DesignProblem {
         let mut sum = 0.0;
         for example in 0..self.margins.len() {
             let change = slope * self.right[example] * (after[example] - before[example]);
-            sum += self.weights[example] * (self.margins[example] / ENOUGH + change).clamp(self.floor, 1.0);
+            sum += self.weights[example]
+                * (self.margins[example] / ENOUGH + change).clamp(self.floor, 1.0);
         }
         sum
     }
@@ -145,7 +163,8 @@ impl DesignProblem {
         let (slope, now) = (self.slopes[place], self.design[place]);
         let (before, after) = (&self.widths[place][now], &self.widths[place][choice]);
         for example in 0..self.margins.len() {
-            self.margins[example] += slope * self.right[example] * (after[example] - before[example]);
+            self.margins[example] +=
+                slope * self.right[example] * (after[example] - before[example]);
         }
         (self.design[place], self.objective) = (choice, objective);
     }
@@ -181,7 +200,9 @@ impl DesignProblem {
     /// Changes up to `most` of these places, each time the one that helps most, until none helps.
     pub(crate) fn best_changes(&mut self, places: &[usize], most: usize) {
         for _ in 0..most {
-            let all = places.iter().flat_map(|place| CHOSEN.map(move |choice| (*place, choice)));
+            let all = places
+                .iter()
+                .flat_map(|place| CHOSEN.map(move |choice| (*place, choice)));
             let others = all.filter(|(place, choice)| *choice != self.design[*place]);
             let tried = others.map(|(place, choice)| (self.tried(place, choice), (place, choice)));
             match tried.reduce(better) {
@@ -200,8 +221,12 @@ impl DesignProblem {
             let before = self.objective;
             for place in random.sample(places, places) {
                 let others = CHOSEN.filter(|choice| *choice != self.design[place]);
-                let best = others.map(|choice| (self.tried(place, choice), choice)).reduce(better);
-                if let Some((objective, choice)) = best.filter(|(o, _)| *o > self.objective + LEAST_GAIN) {
+                let best = others
+                    .map(|choice| (self.tried(place, choice), choice))
+                    .reduce(better);
+                if let Some((objective, choice)) =
+                    best.filter(|(o, _)| *o > self.objective + LEAST_GAIN)
+                {
                     self.change(place, choice, objective);
                 }
             }
@@ -235,10 +260,14 @@ mod tests {
         let slopes: Vec<f64> = (0..places).map(|_| 8.0 * random.normal()).collect();
         let examples = (0..images)
             .map(|_| {
-                let image = Grid::from_fn(1, places, |_, _| f64::from(u8::from(random.unit() < 0.5)));
+                let image =
+                    Grid::from_fn(1, places, |_, _| f64::from(u8::from(random.unit() < 0.5)));
                 let right = if random.unit() < 0.5 { 1.0 } else { -1.0 };
-                let displacement =
-                    2.0 + dot(&slopes, &gait.widths(&gait.design(), &image, &Physics::default()));
+                let displacement = 2.0
+                    + dot(
+                        &slopes,
+                        &gait.widths(&gait.design(), &image, &Physics::default()),
+                    );
                 Example {
                     displacement,
                     right,
@@ -254,9 +283,12 @@ mod tests {
     fn objective(gait: &Gait, examples: &[Example], slopes: &[f64], design: &[Material]) -> f64 {
         let weight: f64 = examples.iter().map(|example| example.weight).sum();
         let clipped = |example: &Example| {
-            let change = dot(slopes, &example.widths(design)) - dot(slopes, &example.widths(&gait.design()));
+            let change =
+                dot(slopes, &example.widths(design)) - dot(slopes, &example.widths(&gait.design()));
             example.weight
-                * crate::task::fitness::clipped_margin(example.right * (example.displacement + change))
+                * crate::task::fitness::clipped_margin(
+                    example.right * (example.displacement + change),
+                )
         };
         examples.iter().map(clipped).sum::<f64>() / weight
     }
@@ -268,10 +300,13 @@ mod tests {
             let (gait, examples, slopes) = lesson(6, 40, seed);
             let all: Vec<&Example> = examples.iter().collect();
             let every = (0..64_usize).map(|code| -> Design {
-                (0..6).map(|place| CHOICES[CHOSEN.start + code / 2_usize.pow(place) % 2]).collect()
+                (0..6)
+                    .map(|place| CHOICES[CHOSEN.start + code / 2_usize.pow(place) % 2])
+                    .collect()
             });
-            let best =
-                every.map(|design| objective(&gait, &examples, &slopes, &design)).fold(f64::MIN, f64::max);
+            let best = every
+                .map(|design| objective(&gait, &examples, &slopes, &design))
+                .fold(f64::MIN, f64::max);
             let mut lesson = DesignProblem::new(&all, &slopes, &gait.design());
             lesson.solve_from_many(&mut random(seed));
             let (found, design) = (lesson.objective(), lesson.design());

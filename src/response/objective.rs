@@ -29,7 +29,9 @@ fn opposites(stimuli: &[Grid<f64>], physics: &Physics, seed: u64) -> Vec<Grid<f6
         return Vec::new();
     };
     let changes = Grid::from_fn(first.height(), first.width(), |row, column| {
-        stimuli.iter().any(|other| other[(row, column)] != first[(row, column)])
+        stimuli
+            .iter()
+            .any(|other| other[(row, column)] != first[(row, column)])
     });
     let pair = |number: u64| {
         let mut random = stream(seed, Purpose::RandomImages, OF_EVOLUTION, number);
@@ -81,7 +83,10 @@ impl Objective for GaitResponse {
         physics: &Physics,
         seed: u64,
     ) -> (Vec<Grid<f64>>, Vec<Condition>) {
-        (opposites(&stimuli, physics, seed), conditions(stimuli.len()))
+        (
+            opposites(&stimuli, physics, seed),
+            conditions(stimuli.len()),
+        )
     }
 
     fn simulated<'b>(&self, body: &'b Body) -> Cow<'b, Body> {
@@ -108,8 +113,13 @@ impl Objective for GaitResponse {
     }
 
     fn given_up(&self, to_beat: &[Option<f64>]) -> Option<Box<MayWin<'static>>> {
-        let least = to_beat.iter().flatten().fold(f64::INFINITY, |least, next| least.min(*next));
-        Some(Box::new(move |known| least.is_finite() && is_left_behind(known, least)))
+        let least = to_beat
+            .iter()
+            .flatten()
+            .fold(f64::INFINITY, |least, next| least.min(*next));
+        Some(Box::new(move |known| {
+            least.is_finite() && is_left_behind(known, least)
+        }))
     }
 }
 
@@ -120,12 +130,19 @@ mod tests {
     #[test]
     fn a_body_is_left_behind_by_the_first_half_of_its_pairs_alone() {
         let known = |d: &[f64]| -> Vec<Option<f64>> {
-            d.iter().map(|d| Some(*d)).chain(std::iter::repeat(None)).take(16).collect()
+            d.iter()
+                .map(|d| Some(*d))
+                .chain(std::iter::repeat(None))
+                .take(16)
+                .collect()
         };
         let pairs = [3.0, -3.0, 2.0, -2.0, -1.0, 1.0, -2.0, 2.0];
         let response = 4.5_f64.sqrt();
         assert!(is_left_behind(&known(&pairs), 2.01 * response));
-        assert!(!is_left_behind(&known(&pairs), 1.99 * response) && !is_left_behind(&known(&pairs), -9.0));
+        assert!(
+            !is_left_behind(&known(&pairs), 1.99 * response)
+                && !is_left_behind(&known(&pairs), -9.0)
+        );
         assert!(!is_left_behind(&known(&pairs[..7]), 1e9));
         let more: Vec<f64> = pairs.into_iter().chain([900.0, -900.0, 0.0, 0.0]).collect();
         assert!(is_left_behind(&known(&more), 2.01 * response));

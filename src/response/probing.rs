@@ -26,7 +26,10 @@ impl Probing {
                 once.push(condition.clone());
             }
         }
-        Probing { conditions: once, seed }
+        Probing {
+            conditions: once,
+            seed,
+        }
     }
 
     /// Returns the conditions, each once, in the order of their numbers.
@@ -54,15 +57,22 @@ impl Probing {
         };
         let condition = |number: usize| number % self.conditions.len();
         let stimuli: Vec<Grid<f64>> = numbers.clone().map(image).collect();
-        let conditions: Vec<Condition> =
-            numbers.clone().map(|number| self.conditions[condition(number)].clone()).collect();
+        let conditions: Vec<Condition> = numbers
+            .clone()
+            .map(|number| self.conditions[condition(number)].clone())
+            .collect();
         let displacements = roll(&probe, &stimuli, &conditions)?;
         let design = vec![Material::SensorExpand; gait.places().len()];
-        let shown =
-            numbers.zip(&stimuli).zip(displacements).filter_map(|((number, stimulus), displacement)| {
+        let shown = numbers.zip(&stimuli).zip(displacements).filter_map(
+            |((number, stimulus), displacement)| {
                 let widths = gait.widths(&design, stimulus, physics);
-                Some(RandomRollout { widths, displacement: displacement?, condition: condition(number) })
-            });
+                Some(RandomRollout {
+                    widths,
+                    displacement: displacement?,
+                    condition: condition(number),
+                })
+            },
+        );
         Ok(shown.collect())
     }
 }
@@ -70,5 +80,9 @@ impl Probing {
 /// Returns the response from the stable rollouts `shown`, out of `rollouts`; `None` if most are
 /// unstable, or too few stable.
 pub(crate) fn response(shown: &[RandomRollout], rollouts: usize) -> Option<Response> {
-    if 2 * shown.len() > rollouts { Response::of(shown) } else { None }
+    if 2 * shown.len() > rollouts {
+        Response::of(shown)
+    } else {
+        None
+    }
 }

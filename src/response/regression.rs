@@ -51,7 +51,11 @@ impl Moments {
 
     /// Returns the mean displacement \[voxel lengths\]; 0 without rollouts.
     pub(crate) fn mean(&self) -> f64 {
-        if self.count > 0.0 { self.displacement / self.count } else { 0.0 }
+        if self.count > 0.0 {
+            self.displacement / self.count
+        } else {
+            0.0
+        }
     }
 
     fn plus(&self, other: &Moments, sign: f64) -> Self {
@@ -66,7 +70,12 @@ impl Moments {
 
     /// Returns the intercept that fits these slopes \[voxel lengths\]; `None` without rollouts.
     pub(crate) fn intercept(&self, slopes: &[f64]) -> Option<f64> {
-        let explained: f64 = self.widths.iter().zip(slopes).map(|(width, slope)| width * slope).sum();
+        let explained: f64 = self
+            .widths
+            .iter()
+            .zip(slopes)
+            .map(|(width, slope)| width * slope)
+            .sum();
         (self.count > 0.0).then(|| (self.displacement - explained) / self.count)
     }
 }
@@ -82,7 +91,10 @@ pub(crate) struct Evidence {
 impl Evidence {
     /// Makes evidence of no rollout, for a gait with this number of places.
     pub(crate) fn new(places: usize) -> Self {
-        Evidence { matrix: DMatrix::zeros(places, places), vector: DVector::zeros(places) }
+        Evidence {
+            matrix: DMatrix::zeros(places, places),
+            vector: DVector::zeros(places),
+        }
     }
 
     /// Adds a set of rollouts with a weight.
@@ -108,7 +120,10 @@ impl Evidence {
     /// Returns the slopes with the least bias: by ridge regression with the smallest penalty.
     pub(crate) fn least_biased(&self) -> Fit {
         let factor = self.factor(RIDGES[0]);
-        Fit { slopes: factor.solve(&self.vector).as_slice().to_vec(), factor }
+        Fit {
+            slopes: factor.solve(&self.vector).as_slice().to_vec(),
+            factor,
+        }
     }
 
     /// Returns the slopes by ridge regression, and their standard errors in units of a rollout's
@@ -119,7 +134,9 @@ impl Evidence {
     pub(crate) fn slopes(&self, ridge: f64) -> (Vec<f64>, Vec<f64>) {
         let factor = self.factor(ridge);
         let inverse = factor.inverse();
-        let errors = (0..self.vector.len()).map(|i| inverse[(i, i)].sqrt()).collect();
+        let errors = (0..self.vector.len())
+            .map(|i| inverse[(i, i)].sqrt())
+            .collect();
         (factor.solve(&self.vector).as_slice().to_vec(), errors)
     }
 
@@ -147,7 +164,9 @@ impl Evidence {
         assert!(ridge > 0.0, "a ridge is above 0");
         let mut matrix = self.matrix.clone();
         (0..matrix.nrows()).for_each(|i| matrix[(i, i)] += ridge);
-        matrix.cholesky().expect("sums of squares plus a ridge above 0 are positive definite")
+        matrix
+            .cholesky()
+            .expect("sums of squares plus a ridge above 0 are positive definite")
     }
 }
 
@@ -220,13 +239,19 @@ impl Response {
         let mut folds = vec![vec![Moments::new(places); conditions]; FOLDS];
         for (number, shown) in rollouts.iter().enumerate() {
             // Folds alternate within a condition, whatever the order of the conditions.
-            folds[(number / conditions) % FOLDS][shown.condition].add(&shown.widths, shown.displacement);
+            folds[(number / conditions) % FOLDS][shown.condition]
+                .add(&shown.widths, shown.displacement);
         }
         let total = |condition: usize| {
-            folds.iter().fold(Moments::new(places), |sum, fold| sum.plus(&fold[condition], 1.0))
+            folds.iter().fold(Moments::new(places), |sum, fold| {
+                sum.plus(&fold[condition], 1.0)
+            })
         };
         let all: Vec<Moments> = (0..conditions).map(total).collect();
-        let spread: f64 = rollouts.iter().map(|s| squared(s.displacement - all[s.condition].mean())).sum();
+        let spread: f64 = rollouts
+            .iter()
+            .map(|s| squared(s.displacement - all[s.condition].mean()))
+            .sum();
         let evidence = |sets: &[Moments]| {
             let mut evidence = Evidence::new(places);
             sets.iter().for_each(|set| evidence.add(set, 1.0));
@@ -235,10 +260,16 @@ impl Response {
         let missed = |ridge: f64| -> f64 {
             let mut sum = 0.0;
             for (number, fold) in folds.iter().enumerate() {
-                let others: Vec<Moments> =
-                    all.iter().zip(fold).map(|(all, own)| all.plus(own, -1.0)).collect();
+                let others: Vec<Moments> = all
+                    .iter()
+                    .zip(fold)
+                    .map(|(all, own)| all.plus(own, -1.0))
+                    .collect();
                 let slopes = evidence(&others).slopes_alone(ridge);
-                let own = rollouts.iter().enumerate().filter(|(n, _)| (n / conditions) % FOLDS == number);
+                let own = rollouts
+                    .iter()
+                    .enumerate()
+                    .filter(|(n, _)| (n / conditions) % FOLDS == number);
                 for (_, shown) in own {
                     let Some(intercept) = others[shown.condition].intercept(&slopes) else {
                         continue;
@@ -259,12 +290,16 @@ impl Response {
         let evidence = evidence(&all);
         let (slopes, factors) = evidence.slopes(ridge);
         let found = DVector::from_column_slice(&slopes);
-        let left = spread - 2.0 * found.dot(&evidence.vector) + (&evidence.matrix * &found).dot(&found);
+        let left =
+            spread - 2.0 * found.dot(&evidence.vector) + (&evidence.matrix * &found).dot(&found);
         // The effective number of parameters, by which residuals are smaller than the scatter.
         let fitted = places as f64 - ridge * dot(&factors, &factors)
             + all.iter().filter(|moments| moments.count > 0.0).count() as f64;
         let scatter = (left.max(0.0) / (rollouts.len() as f64 - fitted).max(1.0)).sqrt();
-        let intercepts: Vec<Option<f64>> = all.iter().map(|moments| moments.intercept(&slopes)).collect();
+        let intercepts: Vec<Option<f64>> = all
+            .iter()
+            .map(|moments| moments.intercept(&slopes))
+            .collect();
         let known = intercepts.iter().flatten();
         Some(Response {
             intercept: known.clone().sum::<f64>() / known.count() as f64,
@@ -273,7 +308,11 @@ impl Response {
             errors: factors.into_iter().map(|factor| scatter * factor).collect(),
             noise,
             scatter,
-            r_squared: if spread > 0.0 { 1.0 - least / spread } else { 0.0 },
+            r_squared: if spread > 0.0 {
+                1.0 - least / spread
+            } else {
+                0.0
+            },
             ridge,
             evidence,
         })
@@ -292,7 +331,11 @@ impl Response {
                 .sum()
         };
         let off = weighed(&self.errors);
-        if off > 0.0 { (off / (off + weighed(&self.slopes))).sqrt() } else { 0.0 }
+        if off > 0.0 {
+            (off / (off + weighed(&self.slopes))).sqrt()
+        } else {
+            0.0
+        }
     }
 }
 
@@ -323,11 +366,18 @@ mod tests {
     ) -> Vec<RandomRollout> {
         let mut random = random(seed);
         let rollout = |number: usize| {
-            let widths: Vec<f64> =
-                slopes.iter().map(|_| if random.unit() < 0.45 { 1.6 } else { 0.6 }).collect();
+            let widths: Vec<f64> = slopes
+                .iter()
+                .map(|_| if random.unit() < 0.45 { 1.6 } else { 0.6 })
+                .collect();
             let condition = number % intercepts.len();
-            let displacement = intercepts[condition] + dot(slopes, &widths) + noise * random.normal();
-            RandomRollout { widths, displacement, condition }
+            let displacement =
+                intercepts[condition] + dot(slopes, &widths) + noise * random.normal();
+            RandomRollout {
+                widths,
+                displacement,
+                condition,
+            }
         };
         (0..count).map(rollout).collect()
     }
@@ -336,8 +386,17 @@ mod tests {
     fn the_response_of_a_linear_body_is_recovered_whatever_the_conditions_add() {
         let slopes: Vec<f64> = (0..30).map(|i| f64::from(i % 7) - 3.0).collect();
         let response = Response::of(&planted(&slopes, &[4.0, -9.0, 30.0], 0.0, 120, 1)).unwrap();
-        let worst = response.slopes.iter().zip(&slopes).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        assert!(worst < 0.1 && response.r_squared > 0.999, "{worst} {}", response.r_squared);
+        let worst = response
+            .slopes
+            .iter()
+            .zip(&slopes)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max);
+        assert!(
+            worst < 0.1 && response.r_squared > 0.999,
+            "{worst} {}",
+            response.r_squared
+        );
         // Too few for a fit.
         assert_eq!(Response::of(&planted(&slopes, &[0.0], 0.0, 9, 1)), None);
     }
@@ -350,7 +409,9 @@ mod tests {
             let response = Response::of(&planted(&slopes, &[1.0, 5.0], 5.0, 400, seed)).unwrap();
             assert!((4.5..6.5).contains(&response.noise), "{}", response.noise);
             let pairs = response.slopes.iter().zip(&response.errors).zip(&slopes);
-            inside += pairs.filter(|((found, error), slope)| (*found - *slope).abs() < 2.0 * *error).count();
+            inside += pairs
+                .filter(|((found, error), slope)| (*found - *slope).abs() < 2.0 * *error)
+                .count();
             all += slopes.len();
         }
         let share = f64::from(inside as u32) / f64::from(all as u32);
@@ -387,7 +448,9 @@ mod tests {
                 let intercepts = [0.0, 3.0, -2.0, 7.0, 1.0, 4.0];
                 let shown = planted(&slopes, &intercepts, noise, rollouts, 100 + seed);
                 let response = Response::of(&shown).unwrap();
-                for ((found, error), slope) in response.slopes.iter().zip(&response.errors).zip(&slopes) {
+                for ((found, error), slope) in
+                    response.slopes.iter().zip(&response.errors).zip(&slopes)
+                {
                     let off = (found - slope) / error;
                     squares += off * off;
                     within += usize::from(off.abs() < 2.0);
@@ -396,7 +459,10 @@ mod tests {
             }
             let (size, share) = ((squares / all).sqrt(), within as f64 / all);
             let case = format!("{places} places, {rollouts} rollouts: {size} {share}");
-            assert!((0.88..1.12).contains(&size) && (0.92..0.98).contains(&share), "{case}");
+            assert!(
+                (0.88..1.12).contains(&size) && (0.92..0.98).contains(&share),
+                "{case}"
+            );
         }
     }
 
@@ -415,14 +481,26 @@ mod tests {
                     }
                 }
                 let response = Response::of(&shown).unwrap();
-                let wrong: Vec<f64> = response.slopes.iter().zip(&slopes).map(|(a, b)| a - b).collect();
+                let wrong: Vec<f64> = response
+                    .slopes
+                    .iter()
+                    .zip(&slopes)
+                    .map(|(a, b)| a - b)
+                    .collect();
                 off += dot(&wrong[..30], &wrong[..30]) / dot(&slopes[..30], &slopes[..30]) / 8.0;
                 said += squared(response.relative_error()) / 8.0;
             }
             let (off, said) = (off.sqrt(), said.sqrt());
-            assert!((said / off - 1.0).abs() < 0.15, "{rollouts} {noise}: {said}, in truth {off}");
+            assert!(
+                (said / off - 1.0).abs() < 0.15,
+                "{rollouts} {noise}: {said}, in truth {off}"
+            );
         }
         let nothing = Response::of(&planted(&[0.0; 60], &[0.0], 5.0, 600, 3)).unwrap();
-        assert!(nothing.relative_error() > 0.6, "{}", nothing.relative_error());
+        assert!(
+            nothing.relative_error() > 0.6,
+            "{}",
+            nothing.relative_error()
+        );
     }
 }

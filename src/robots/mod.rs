@@ -15,7 +15,10 @@ use std::path::{Path, PathBuf};
 /// As [`StoredRun::read`].
 pub(crate) fn open(path: &Path) -> Result<StoredRun, Error> {
     match path == published::archive() {
-        true => Ok(StoredRun { path: path.to_path_buf(), run: published::run()? }),
+        true => Ok(StoredRun {
+            path: path.to_path_buf(),
+            run: published::run()?,
+        }),
         false => StoredRun::read(path),
     }
 }
@@ -25,7 +28,10 @@ pub(crate) fn open(path: &Path) -> Result<StoredRun, Error> {
 ///
 /// # Errors
 /// Returns an error if there is no run.
-pub(crate) fn archives(named: Vec<PathBuf>, robots: Selection) -> Result<(Vec<PathBuf>, Selection), Error> {
+pub(crate) fn archives(
+    named: Vec<PathBuf>,
+    robots: Selection,
+) -> Result<(Vec<PathBuf>, Selection), Error> {
     if !named.is_empty() {
         return Ok((named, robots));
     }
@@ -33,5 +39,8 @@ pub(crate) fn archives(named: Vec<PathBuf>, robots: Selection) -> Result<(Vec<Pa
         return Ok((vec![folder::newest_run()?], robots));
     }
     let all = matches!(&robots, Selection::Ids(ids) if ids.iter().any(|id| id == published::ALL));
-    Ok((vec![published::archive()], if all { Selection::All } else { robots }))
+    Ok((
+        vec![published::archive()],
+        if all { Selection::All } else { robots },
+    ))
 }

@@ -33,8 +33,12 @@ pub(crate) const TEXT: &str = include_str!("../../data/gallery.json");
 /// Returns an error if there is no such set, or if it is damaged (which a test excludes).
 pub fn trained(set: &str) -> Result<Vec<(RunFile, AuditFile)>, Error> {
     let paths = gallery::runs(set).map_err(Error::other)?;
-    let read =
-        |path: &PathBuf| Ok((RunFile::read(path)?, AuditFile::read(&path.with_file_name(AUDIT_JSON))?));
+    let read = |path: &PathBuf| {
+        Ok((
+            RunFile::read(path)?,
+            AuditFile::read(&path.with_file_name(AUDIT_JSON))?,
+        ))
+    };
     paths.iter().map(read).collect()
 }
 
@@ -55,9 +59,16 @@ impl Published {
     /// Returns the classes that its two directions stand for.
     pub(crate) fn judge(&self) -> Readout {
         let says = |way| {
-            if way == self.zero_walks { vec![0] } else { vec![1] }
+            if way == self.zero_walks {
+                vec![0]
+            } else {
+                vec![1]
+            }
         };
-        Readout { left: says(Direction::Left), right: says(Direction::Right) }
+        Readout {
+            left: says(Direction::Left),
+            right: says(Direction::Right),
+        }
     }
 }
 
@@ -74,10 +85,26 @@ pub fn gallery() -> Result<Vec<Published>, Error> {
         body: String,
     }
     let entries: Vec<Entry> = crate::config::reading::read_json_list(TEXT, "gallery.json")?;
-    let robot = |Entry { name, published_fitness, zero_walks, body }: Entry| {
-        let body = body.parse().map_err(|error| Error::other(format!("gallery.json: {name}: {error}")))?;
-        let zero_walks = if zero_walks == "left" { Direction::Left } else { Direction::Right };
-        Ok(Published { name, fitness: published_fitness, zero_walks, body })
+    let robot = |Entry {
+                     name,
+                     published_fitness,
+                     zero_walks,
+                     body,
+                 }: Entry| {
+        let body = body
+            .parse()
+            .map_err(|error| Error::other(format!("gallery.json: {name}: {error}")))?;
+        let zero_walks = if zero_walks == "left" {
+            Direction::Left
+        } else {
+            Direction::Right
+        };
+        Ok(Published {
+            name,
+            fitness: published_fitness,
+            zero_walks,
+            body,
+        })
     };
     entries.into_iter().map(robot).collect()
 }
@@ -87,7 +114,9 @@ pub fn gallery() -> Result<Vec<Published>, Error> {
 /// # Errors
 /// As [`gallery()`].
 pub fn find(name: &str) -> Result<Option<Published>, Error> {
-    Ok(gallery()?.into_iter().find(|robot| robot.name.eq_ignore_ascii_case(name)))
+    Ok(gallery()?
+        .into_iter()
+        .find(|robot| robot.name.eq_ignore_ascii_case(name)))
 }
 
 /// Returns the config under which the published robots were evolved.
@@ -95,7 +124,10 @@ pub fn find(name: &str) -> Result<Option<Published>, Error> {
 /// # Errors
 /// Returns an error if the built-in config is damaged (which a test excludes).
 pub fn config() -> Result<Config, Error> {
-    let text = BUILT_IN.iter().find(|(name, _)| *name == CONFIG).map_or("", |(_, text)| text);
+    let text = BUILT_IN
+        .iter()
+        .find(|(name, _)| *name == CONFIG)
+        .map_or("", |(_, text)| text);
     Config::parse(text, CONFIG, &[])
 }
 
@@ -111,9 +143,14 @@ pub(crate) fn is_meant(selection: &Selection) -> Result<bool, Error> {
     if matches!(ids.as_slice(), [word] if word == ALL) {
         return Ok(true);
     }
-    let published: Result<Vec<bool>, Error> = ids.iter().map(|id| Ok(find(id)?.is_some())).collect();
+    let published: Result<Vec<bool>, Error> =
+        ids.iter().map(|id| Ok(find(id)?.is_some())).collect();
     let published = published?;
-    match published.iter().zip(ids).find(|(is_published, _)| !**is_published) {
+    match published
+        .iter()
+        .zip(ids)
+        .find(|(is_published, _)| !**is_published)
+    {
         Some((_, other)) if published.contains(&true) => {
             let text = format!("there is no published robot {other}");
             Err(Error::input(text).remedy(Remedy::Run(Invocation::new("gallery"), "lists them")))
@@ -143,8 +180,10 @@ pub(crate) fn archive() -> PathBuf {
 pub(crate) fn run() -> Result<RunFile, Error> {
     let config = config()?;
     let indices = config.data.train_images.iter().flatten();
-    let training_images =
-        indices.zip(config.classes()).map(|(&index, label)| ImageRef { index, label }).collect();
+    let training_images = indices
+        .zip(config.classes())
+        .map(|(&index, label)| ImageRef { index, label })
+        .collect();
     let robot = |(number, robot): (usize, Published)| {
         let (left, right) = (-robot.fitness, robot.fitness);
         let displacements = match robot.zero_walks {
@@ -165,12 +204,19 @@ pub(crate) fn run() -> Result<RunFile, Error> {
         }
     };
     let train_sha256 = catalogue::MNIST_CONTENT[0].to_string();
-    let dataset = DatasetRef { name: config.data.dataset.clone(), train_sha256 };
+    let dataset = DatasetRef {
+        name: config.data.dataset.clone(),
+        train_sha256,
+    };
     let (data, none) = ((&dataset, training_images), Archive::new());
     let elites = gallery()?.into_iter().enumerate().map(robot).collect();
     // They fill no archive: several may be in one cell.
     let stats = none.stats(1, 0.0);
-    Ok(RunFile { elites, stats, ..RunFile::new(ALL, &config, data, config.generations, &none)? })
+    Ok(RunFile {
+        elites,
+        stats,
+        ..RunFile::new(ALL, &config, data, config.generations, &none)?
+    })
 }
 
 #[cfg(test)]
@@ -185,7 +231,11 @@ mod tests {
         let robots = gallery().unwrap();
         let names: Vec<&str> = robots.iter().map(|robot| robot.name.as_str()).collect();
         assert_eq!(names, ["APUKI", "IHSUJ", "QMAXD", "XFJPI", "YJTLA"]);
-        assert!(robots.iter().all(|r| (r.body.height(), r.body.width()) == (14, 14) && r.body.is_valid(3)));
+        assert!(
+            robots
+                .iter()
+                .all(|r| (r.body.height(), r.body.width()) == (14, 14) && r.body.is_valid(3))
+        );
         assert_eq!(find("xfjpi").unwrap().unwrap().fitness, 17.316384958834874);
         assert_eq!(find("nobody").unwrap(), None);
         assert_eq!(config().unwrap().classes(), [0, 1]);
@@ -196,17 +246,32 @@ mod tests {
         for (set, pairs) in [(gallery::ZERO_ONE, 1), (gallery::TEAM, 45)] {
             let trained = trained(set).unwrap();
             let like = |run: &RunFile| {
-                let Config { stimulus, protocol, physics, .. } = &run.config;
-                let stimulus = StimulusParams { margin: Margins::default(), ..*stimulus };
+                let Config {
+                    stimulus,
+                    protocol,
+                    physics,
+                    ..
+                } = &run.config;
+                let stimulus = StimulusParams {
+                    margin: Margins::default(),
+                    ..*stimulus
+                };
                 let world = (stimulus, protocol.clone(), physics.clone());
                 (run.config.body_spec(), world, run.dataset.clone())
             };
             for (run, audit) in &trained {
                 assert_eq!(like(run), like(&trained[0].0));
                 assert_eq!(audit.run_sha256, run.fingerprint());
-                assert!(run.elites.iter().all(|robot| audit.robot(&robot.id).unwrap().is_physical()));
+                assert!(
+                    run.elites
+                        .iter()
+                        .all(|robot| audit.robot(&robot.id).unwrap().is_physical())
+                );
             }
-            let tasks: BTreeSet<Vec<u8>> = trained.iter().map(|(run, _)| run.config.classes()).collect();
+            let tasks: BTreeSet<Vec<u8>> = trained
+                .iter()
+                .map(|(run, _)| run.config.classes())
+                .collect();
             assert_eq!(tasks.len(), pairs, "{set}");
         }
     }

@@ -69,9 +69,11 @@ impl<'a> Run<'a> {
         saved: Option<Checkpoint>,
     ) -> Result<Self, Error> {
         let (archive, known, totals, generation) = match saved {
-            Some(Checkpoint { run, totals, known_bodies }) => {
-                (run.archive()?, known_bodies, totals, run.generations)
-            }
+            Some(Checkpoint {
+                run,
+                totals,
+                known_bodies,
+            }) => (run.archive()?, known_bodies, totals, run.generations),
             None => Default::default(),
         };
         let grouping = config.grouping()?.with_fitness(config.evaluation.fitness);
@@ -93,9 +95,16 @@ impl<'a> Run<'a> {
 
     /// Says what begins in a folder.
     pub(crate) fn beginning(&self, out: &Path) -> String {
-        let verb = if self.generation > 0 { "going on with" } else { "evolving in" };
+        let verb = if self.generation > 0 {
+            "going on with"
+        } else {
+            "evolving in"
+        };
         let (out, dataset) = (out.display(), &self.training.dataset.name);
-        format!("{verb} {out}; images from {dataset}: {}", self.training.listed())
+        format!(
+            "{verb} {out}; images from {dataset}: {}",
+            self.training.listed()
+        )
     }
 
     /// Repeats ask, evaluate, tell. A stopped generation leaves the run as it was before.
@@ -120,12 +129,18 @@ impl<'a> Run<'a> {
                 done => done?,
             }
             if let Some(files) = files {
-                files.metrics.write(self.generation - 1, &self.stats(), &self.totals())?;
+                files
+                    .metrics
+                    .write(self.generation - 1, &self.stats(), &self.totals())?;
             }
             session.observer.generation(&self.progress());
             let Some(files) = files else { continue };
             let is_due = saved.elapsed() >= every.max(cost * MOST_SHARE);
-            if is_due || self.generation.is_multiple_of(config.checkpoint.generations) {
+            if is_due
+                || self
+                    .generation
+                    .is_multiple_of(config.checkpoint.generations)
+            {
                 let began = Instant::now();
                 files.save(self)?;
                 cost = began.elapsed();
@@ -149,9 +164,15 @@ impl<'a> Run<'a> {
             session.check()?;
             self.search.make(proposal, mutations).map_err(unmade)
         };
-        let robots = proposals.par_iter().map(make).collect::<Result<Vec<Robot>, Error>>();
+        let robots = proposals
+            .par_iter()
+            .map(make)
+            .collect::<Result<Vec<Robot>, Error>>();
         let robots = self.together(robots)?;
-        let children = proposals.iter().zip(robots).map(|(asked, robot)| (asked.child, asked.parent, robot));
+        let children = proposals
+            .iter()
+            .zip(robots)
+            .map(|(asked, robot)| (asked.child, asked.parent, robot));
         let children: Vec<Child> = children.collect();
         let count = children.len() as u64;
         let (fresh, new) = self.unknown(children);
@@ -192,21 +213,41 @@ impl<'a> Run<'a> {
     /// Shows the training images to what is simulated for children.
     fn scored(&self, children: &[Child], session: &Session) -> Result<Vec<Evaluation>, Error> {
         let config = self.config;
-        let TrainingImages { stimuli, conditions, .. } = &self.training;
-        let simulated = |(_, _, robot): &'_ Child| config.objective().simulated(&robot.body).into_owned();
+        let TrainingImages {
+            stimuli,
+            conditions,
+            ..
+        } = &self.training;
+        let simulated =
+            |(_, _, robot): &'_ Child| config.objective().simulated(&robot.body).into_owned();
         let bodies: Vec<Body> = children.iter().map(simulated).collect();
         let thresholds = self.admission_thresholds();
         let children = children.iter().zip(&bodies);
-        let jobs: Vec<Job> =
-            children.map(|((_, parent, robot), body)| self.job(*parent, robot, body, &thresholds)).collect();
+        let jobs: Vec<Job> = children
+            .map(|((_, parent, robot), body)| self.job(*parent, robot, body, &thresholds))
+            .collect();
         let (physics, protocol) = (&config.physics, &config.protocol);
         let ranks = self.session.ranks;
-        let sizes: Vec<u64> = jobs.iter().map(|job| job.body.counts().total as u64).collect();
+        let sizes: Vec<u64> = jobs
+            .iter()
+            .map(|job| job.body.counts().total as u64)
+            .collect();
         let evaluate = |jobs: &[Job]| {
-            evaluate(jobs, stimuli, conditions, physics, protocol, config.savings, session).ok()
+            evaluate(
+                jobs,
+                stimuli,
+                conditions,
+                physics,
+                protocol,
+                config.savings,
+                session,
+            )
+            .ok()
         };
         // If one rank drops a generation, all do.
-        Ok(ranks.scatter_gather(jobs, &sizes, evaluate).ok_or(Stopped)?)
+        Ok(ranks
+            .scatter_gather(jobs, &sizes, evaluate)
+            .ok_or(Stopped)?)
     }
 
     /// Returns this rank's own result if all ranks have one.
@@ -214,7 +255,11 @@ impl<'a> Run<'a> {
         let is_made = own.is_ok();
         let are_made = self.session.ranks.share(is_made);
         let own = own?;
-        if are_made.contains(&false) { Err(Stopped.into()) } else { Ok(own) }
+        if are_made.contains(&false) {
+            Err(Stopped.into())
+        } else {
+            Ok(own)
+        }
     }
 
     /// Adds those children to the archive that were stable and are fit enough.
@@ -231,7 +276,9 @@ impl<'a> Run<'a> {
                 Outcome::Stopped(_) => {}
             }
         }
-        self.search.tell(told).map_err(|error| Error::other(error.to_string()))?;
+        self.search
+            .tell(told)
+            .map_err(|error| Error::other(error.to_string()))?;
         if let Some(keep) = self.config.archive.keep {
             self.search.retain_fittest(keep, |robot| robot.task.clone());
         }
@@ -253,18 +300,31 @@ impl<'a> Run<'a> {
         let to_beat = |task: usize| {
             let cell = self.space.index(&self.cell(bins.clone(), task));
             let in_cell = cell.and_then(|cell| archive.objective(cell));
-            in_cell.into_iter().chain(thresholds[task]).reduce(f64::max).map(|least| least / factor)
+            in_cell
+                .into_iter()
+                .chain(thresholds[task])
+                .reduce(f64::max)
+                .map(|least| least / factor)
         };
         let to_beat: Vec<Option<f64>> = (0..grouping.tasks().len()).map(to_beat).collect();
         let of_parent = parent
             .and_then(|cell| archive.get(cell))
             .map(|elite| training.answers(elite.solution.displacements.iter().copied().map(Some)));
-        let (order, given_up) =
-            (objective.order(grouping, of_parent.as_deref()), objective.given_up(&to_beat));
+        let (order, given_up) = (
+            objective.order(grouping, of_parent.as_deref()),
+            objective.given_up(&to_beat),
+        );
         let may_win = move |known: &[Option<f64>]| {
-            grouping.can_still_win(&training.answers(known.iter().copied()), |task| to_beat[task])
+            grouping.can_still_win(&training.answers(known.iter().copied()), |task| {
+                to_beat[task]
+            })
         };
-        Job { body, order, may_win: Box::new(may_win), given_up }
+        Job {
+            body,
+            order,
+            may_win: Box::new(may_win),
+            given_up,
+        }
     }
 
     /// Scores a robot for the archive; `None` if `archive.keep` would remove it at once.
@@ -275,15 +335,31 @@ impl<'a> Run<'a> {
         displacements: Vec<f64>,
         thresholds: &[Option<f64>],
     ) -> Option<Evaluated<Robot>> {
-        let answers = self.training.answers(displacements.iter().copied().map(Some));
+        let answers = self
+            .training
+            .answers(displacements.iter().copied().map(Some));
         let score = self.grouping.score(&answers);
         let coordinates = self.cell(robot.bins(), score.task);
-        let cell = self.space.index(&coordinates).expect("the coordinates are bins of this very space");
+        let cell = self
+            .space
+            .index(&coordinates)
+            .expect("the coordinates are bins of this very space");
         let task = self.grouping.tasks()[score.task].name();
         let objective = self.config.objective().factor(&robot.body) * score.fitness;
-        let solution = Robot { cell: coordinates, task, objective, displacements, ..robot };
+        let solution = Robot {
+            cell: coordinates,
+            task,
+            objective,
+            displacements,
+            ..robot
+        };
         let is_in = thresholds[score.task].is_none_or(|threshold| objective > threshold);
-        is_in.then_some(Evaluated { child, cell, objective, solution })
+        is_in.then_some(Evaluated {
+            child,
+            cell,
+            objective,
+            solution,
+        })
     }
 
     /// Returns by task the fitness of the last elite that `archive.keep` keeps; `None` while all
@@ -291,8 +367,16 @@ impl<'a> Run<'a> {
     /// later: early stop and known bodies stay lossless.
     fn admission_thresholds(&self) -> Vec<Option<f64>> {
         let keep = self.config.archive.keep;
-        let last = |name: String| self.search.archive().nth_fittest(keep?, |robot| robot.task == name);
-        self.grouping.tasks().iter().map(|task| last(task.name())).collect()
+        let last = |name: String| {
+            self.search
+                .archive()
+                .nth_fittest(keep?, |robot| robot.task == name)
+        };
+        self.grouping
+            .tasks()
+            .iter()
+            .map(|task| last(task.name()))
+            .collect()
     }
 
     /// Returns the coordinates of the cell of a robot that performs a task.
@@ -303,7 +387,10 @@ impl<'a> Run<'a> {
 
     /// Returns the counts so far, including the time of this session.
     pub(crate) fn totals(&self) -> Totals {
-        Totals { seconds: self.totals.seconds + self.began.elapsed().as_secs_f64(), ..self.totals }
+        Totals {
+            seconds: self.totals.seconds + self.began.elapsed().as_secs_f64(),
+            ..self.totals
+        }
     }
 
     fn progress(&self) -> Generation {
@@ -318,13 +405,19 @@ impl<'a> Run<'a> {
     }
 
     fn stats(&self) -> ArchiveStats {
-        self.search.archive().stats(self.dimensions.possible_cells, self.config.archive.qd_offset)
+        self.search.archive().stats(
+            self.dimensions.possible_cells,
+            self.config.archive.qd_offset,
+        )
     }
 
     /// Writes checkpoint, `run.json` and `elites.csv`.
     pub(crate) fn save(&self, folder: &RunFolder) -> Result<(), Error> {
-        let checkpoint =
-            Checkpoint { run: self.file(), totals: self.totals(), known_bodies: self.known.clone() };
+        let checkpoint = Checkpoint {
+            run: self.file(),
+            totals: self.totals(),
+            known_bodies: self.known.clone(),
+        };
         checkpoint::write(folder.path(), &checkpoint)?;
         folder.write_run(&checkpoint.run)
     }
@@ -376,12 +469,18 @@ impl Variation<Robot> for Mutations<'_> {
 
     fn random_immigrant(&self, generation: u64, child: u64) -> Result<Robot, GenomeError> {
         let rng = &mut stream(self.seed, Purpose::RandomImmigrant, generation, child);
-        Ok(unevaluated(Genome::random_unless(self.spec, self.params, rng, self.session)?, generation, None))
+        Ok(unevaluated(
+            Genome::random_unless(self.spec, self.params, rng, self.session)?,
+            generation,
+            None,
+        ))
     }
 
     fn offspring(&self, parent: &Robot, generation: u64, child: u64) -> Result<Robot, GenomeError> {
         let rng = &mut stream(self.seed, Purpose::Mutation, generation, child);
-        let made = parent.genome.offspring_unless(self.spec, self.params, rng, self.session)?;
+        let made = parent
+            .genome
+            .offspring_unless(self.spec, self.params, rng, self.session)?;
         Ok(unevaluated(made, generation, Some(parent)))
     }
 }

@@ -28,8 +28,14 @@ pub(crate) fn control_steps(config: &Config, cycles: u32) -> u32 {
 }
 
 /// Returns the recognition task that a robot performs; `None` if it always walks the same way.
-pub(crate) fn task_of<'a>(grouping: &'a Grouping, robot: &Robot) -> Option<&'a grouping::ClassSplit> {
-    grouping.tasks().iter().find(|split| split.is_called(&robot.task) && !split.is_same_way())
+pub(crate) fn task_of<'a>(
+    grouping: &'a Grouping,
+    robot: &Robot,
+) -> Option<&'a grouping::ClassSplit> {
+    grouping
+        .tasks()
+        .iter()
+        .find(|split| split.is_called(&robot.task) && !split.is_same_way())
 }
 
 pub(crate) struct HeldOutRun<'a> {
@@ -51,7 +57,13 @@ impl<'a> HeldOutRun<'a> {
         session: &'a Session<'a>,
     ) -> Result<Self, Error> {
         let pool = session.pool()?;
-        Ok(HeldOutRun { config, control_steps, pool, session, done: AtomicU64::new(done) })
+        Ok(HeldOutRun {
+            config,
+            control_steps,
+            pool,
+            session,
+            done: AtomicU64::new(done),
+        })
     }
 
     /// Announces a validation. `images` counts those of the best robots, `showings` all rollouts.
@@ -61,14 +73,25 @@ impl<'a> HeldOutRun<'a> {
             counted(robots, "robot", "robots"),
             counted(images, "image", "images")
         );
-        self.session.observer.begins(&Work::new(label, showings, "rollouts"));
+        self.session
+            .observer
+            .begins(&Work::new(label, showings, "rollouts"));
     }
 
     /// Returns the displacement under each image (`None`: unstable) and the number of rollouts.
     /// Images with the same pixels at the sensors share a rollout. Returns `None` if it was
     /// stopped.
-    pub(crate) fn rollouts(&self, robot: &Robot, stimuli: &[Grid<f64>]) -> Option<(Vec<Option<f64>>, usize)> {
-        let HeldOutRun { config, session, done, .. } = self;
+    pub(crate) fn rollouts(
+        &self,
+        robot: &Robot,
+        stimuli: &[Grid<f64>],
+    ) -> Option<(Vec<Option<f64>>, usize)> {
+        let HeldOutRun {
+            config,
+            session,
+            done,
+            ..
+        } = self;
         let protocol = Protocol {
             rollout: RolloutMode::Fresh,
             control_steps: self.control_steps,
@@ -77,13 +100,25 @@ impl<'a> HeldOutRun<'a> {
         let told = |count: u64| {
             // One rollout stands for all of them.
             session.observer.skips(count - 1);
-            session.observer.progress(done.fetch_add(count, Ordering::Relaxed) + count);
+            session
+                .observer
+                .progress(done.fetch_add(count, Ordering::Relaxed) + count);
         };
         let found = self.pool.install(|| {
-            fresh_rollouts(&robot.body, stimuli, &[], (&config.physics, &protocol), &told, session)
+            fresh_rollouts(
+                &robot.body,
+                stimuli,
+                &[],
+                (&config.physics, &protocol),
+                &told,
+                session,
+            )
         });
         let (displacements, simulated) = found.ok()?;
-        Some((displacements.into_iter().map(Result::ok).collect(), simulated))
+        Some((
+            displacements.into_iter().map(Result::ok).collect(),
+            simulated,
+        ))
     }
 }
 
@@ -98,17 +133,27 @@ pub(crate) struct Trial<'a> {
 
 impl RobotReport {
     pub(crate) fn new(trial: &Trial, displacements: Vec<Option<f64>>, simulated: usize) -> Self {
-        let Trial { run, robot, split, images, threshold } = *trial;
+        let Trial {
+            run,
+            robot,
+            split,
+            images,
+            threshold,
+        } = *trial;
         let assignment = Assignment::from_training(split, run.fitness(), &run.answers(robot));
         let is_right = |(image, walk): (&ImageRef, &Option<f64>)| {
             is_correct(split, assignment, image.label, *walk, threshold).unwrap_or(false)
         };
-        let verdicts: Vec<(u8, bool)> =
-            images.iter().zip(&displacements).map(|pair| (pair.0.label, is_right(pair))).collect();
+        let verdicts: Vec<(u8, bool)> = images
+            .iter()
+            .zip(&displacements)
+            .map(|pair| (pair.0.label, is_right(pair)))
+            .collect();
         let share = |of: &dyn Fn(u8) -> bool| {
             let chosen = verdicts.iter().filter(|(class, _)| of(*class));
-            let (right, all) =
-                chosen.fold((0usize, 0usize), |(r, n), (_, right)| (r + usize::from(*right), n + 1));
+            let (right, all) = chosen.fold((0usize, 0usize), |(r, n), (_, right)| {
+                (r + usize::from(*right), n + 1)
+            });
             (right as f64 / all.max(1) as f64, right)
         };
         let (accuracy, right) = share(&|_| true);
@@ -127,7 +172,10 @@ impl RobotReport {
             accuracy,
             interval: wilson(right, images.len()),
             balanced_accuracy: (group(Group::A) + group(Group::B)) / 2.0,
-            per_class: classes.into_iter().map(|class| (class, share(&|c| c == class).0)).collect(),
+            per_class: classes
+                .into_iter()
+                .map(|class| (class, share(&|c| c == class).0))
+                .collect(),
             mean_distance: moved.iter().sum::<f64>() / moved.len().max(1) as f64,
             not_moved: moved.iter().filter(|&&d| d <= threshold).count() as f64 / count,
             unstable: displacements.len() - moved.len(),
@@ -142,20 +190,36 @@ impl EvalFile {
     /// Averages over the robots so far.
     pub(crate) fn conclude(&mut self) {
         let mut by_task = BTreeMap::<&str, Vec<&RobotReport>>::new();
-        self.robots.iter().for_each(|robot| by_task.entry(&robot.task).or_default().push(robot));
+        self.robots
+            .iter()
+            .for_each(|robot| by_task.entry(&robot.task).or_default().push(robot));
         let mean = |robots: &[&RobotReport], of: fn(&RobotReport) -> f64| {
             robots.iter().map(|robot| of(robot)).sum::<f64>() / robots.len() as f64
         };
         let means = by_task.into_iter().map(|(task, robots)| {
-            let (accuracy, balanced_accuracy) =
-                (mean(&robots, |r| r.accuracy), mean(&robots, |r| r.balanced_accuracy));
+            let (accuracy, balanced_accuracy) = (
+                mean(&robots, |r| r.accuracy),
+                mean(&robots, |r| r.balanced_accuracy),
+            );
             let accuracies: Vec<f64> = robots.iter().map(|robot| robot.accuracy).collect();
             let mut by_run = BTreeMap::<usize, Vec<f64>>::new();
-            robots.iter().for_each(|robot| by_run.entry(robot.run).or_default().push(robot.accuracy));
+            robots
+                .iter()
+                .for_each(|robot| by_run.entry(robot.run).or_default().push(robot.accuracy));
             let by_run: Vec<Vec<f64>> = by_run.into_values().collect();
-            let (standard_deviation, interval) = (standard_deviation(&accuracies), bootstrap(&by_run));
+            let (standard_deviation, interval) =
+                (standard_deviation(&accuracies), bootstrap(&by_run));
             let robots = robots.len();
-            (task.to_string(), Mean { robots, accuracy, balanced_accuracy, standard_deviation, interval })
+            (
+                task.to_string(),
+                Mean {
+                    robots,
+                    accuracy,
+                    balanced_accuracy,
+                    standard_deviation,
+                    interval,
+                },
+            )
         });
         self.means = means.collect();
     }

@@ -42,16 +42,31 @@ pub fn named(options: &RobotChoice, session: &Session) -> Result<Vec<Named>, Err
     let RobotChoice { seed, .. } = options;
     let (archives, robots) = robots::archives(options.archives.clone(), options.robots.clone())?;
     if let (Selection::Ids(ids), [archive]) = (&robots, &archives[..]) {
-        let one = |robot: &String| Named { archive: archive.clone(), robot: robot.clone() };
+        let one = |robot: &String| Named {
+            archive: archive.clone(),
+            robot: robot.clone(),
+        };
         return Ok(ids.iter().map(one).collect());
     }
-    let sources: Vec<StoredRun> = archives.iter().map(|path| robots::open(path)).collect::<Result<_, _>>()?;
-    different(sources.iter().map(|source| (source.path.as_path(), &source.run)))?;
-    let name =
-        |source: &StoredRun, robot: &Robot| Named { archive: source.path.clone(), robot: robot.id.clone() };
+    let sources: Vec<StoredRun> = archives
+        .iter()
+        .map(|path| robots::open(path))
+        .collect::<Result<_, _>>()?;
+    different(
+        sources
+            .iter()
+            .map(|source| (source.path.as_path(), &source.run)),
+    )?;
+    let name = |source: &StoredRun, robot: &Robot| Named {
+        archive: source.path.clone(),
+        robot: robot.id.clone(),
+    };
     let Some(count) = robots.validated() else {
         let chosen = robots.physical(options.physical_only).of(&sources, *seed)?;
-        return Ok(chosen.iter().map(|chosen| name(&sources[chosen.source], chosen.robot)).collect());
+        return Ok(chosen
+            .iter()
+            .map(|chosen| name(&sources[chosen.source], chosen.robot))
+            .collect());
     };
     let mut all = Vec::new();
     for source in &sources {
@@ -69,17 +84,29 @@ fn ranked<'a>(
     session: &Session,
 ) -> Result<Vec<(&'a Robot, Validated)>, Error> {
     // Some may not be physical: validate as many as the run does at its end.
-    let known = if options.physical_only { source.run.config.validation.best } else { 0 };
-    let search = validation::ValidationOptions { archive: source.path.clone(), best: Some(count.max(known)) };
+    let known = if options.physical_only {
+        source.run.config.validation.best
+    } else {
+        0
+    };
+    let search = validation::ValidationOptions {
+        archive: source.path.clone(),
+        best: Some(count.max(known)),
+    };
     let Some(best) = validation::validate(&search, session)? else {
         let text = "stopped before the robots were chosen; nothing is shown";
         return Err(Error::stopped(text.to_string()).remedy(Remedy::Repeat));
     };
     let by_id = |validated: Validated| {
         let mut elites = source.run.elites.iter();
-        let robot = elites.find(|robot| robot.id == validated.id && robot.task == validated.task)?;
+        let robot =
+            elites.find(|robot| robot.id == validated.id && robot.task == validated.task)?;
         Some((robot, validated))
     };
     let best: Vec<_> = best.into_iter().filter_map(by_id).collect();
-    if options.physical_only { first_physical(best, source, count) } else { Ok(best) }
+    if options.physical_only {
+        first_physical(best, source, count)
+    } else {
+        Ok(best)
+    }
 }

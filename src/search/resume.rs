@@ -80,19 +80,27 @@ fn without_checkpoint(path: &Path) -> Result<Checkpoint, Error> {
     };
     if let Some(why) = needs {
         let text = format!("{}: expected a checkpoint beside it: {why}", path.display());
-        return Err(Error::input(text).remedy(Remedy::ChooseOut).remedy(Remedy::Replace));
+        return Err(Error::input(text)
+            .remedy(Remedy::ChooseOut)
+            .remedy(Remedy::Replace));
     }
     let mut known_bodies = KnownBodies::default();
     for robot in &run.elites {
         known_bodies.insert(run.config.objective().known_key(&robot.body));
     }
-    Ok(Checkpoint { run, totals: Totals::default(), known_bodies })
+    Ok(Checkpoint {
+        run,
+        totals: Totals::default(),
+        known_bodies,
+    })
 }
 
 /// Checks that a run can resume under a config: everything its results depend on must match.
 fn compatible(saved: &Checkpoint, config: &Config, training: &TrainingImages) -> Result<(), Error> {
     let differs = |text: String| {
-        Error::input(text).advice("resume with the config it was started with").remedy(Remedy::Replace)
+        Error::input(text)
+            .advice("resume with the config it was started with")
+            .remedy(Remedy::Replace)
     };
     let (theirs, ours) = (&saved.run.program_version, env!("CARGO_PKG_VERSION"));
     if theirs != ours {
@@ -105,19 +113,27 @@ fn compatible(saved: &Checkpoint, config: &Config, training: &TrainingImages) ->
     }
     let differing = differing(&saved.run.config.settings(), &config.settings());
     // Training keys only matter after the evolution has ended.
-    if let Some((key, theirs, ours)) = differing.iter().find(|(key, ..)| !key.starts_with("train.")) {
-        let text = format!("the run in this folder has another config: {key} = {theirs} there, {ours} now");
+    if let Some((key, theirs, ours)) = differing
+        .iter()
+        .find(|(key, ..)| !key.starts_with("train."))
+    {
+        let text = format!(
+            "the run in this folder has another config: {key} = {theirs} there, {ours} now"
+        );
         return Err(differs(text));
     }
     if saved.run.dataset != training.dataset || saved.run.training_images != training.images {
         let text =
-            "data: the run in this folder was made with other images: the dataset has changed".to_string();
+            "data: the run in this folder was made with other images: the dataset has changed"
+                .to_string();
         return Err(differs(text));
     }
     let (done, asked) = (saved.run.generations, config.generations);
     if done > asked {
         let text = format!("generations = {asked}: the run in this folder has {done} already");
-        return Err(Error::input(text).advice(format!("ask for {done} or more")).remedy(Remedy::Replace));
+        return Err(Error::input(text)
+            .advice(format!("ask for {done} or more"))
+            .remedy(Remedy::Replace));
     }
     Ok(())
 }

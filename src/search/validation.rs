@@ -40,9 +40,18 @@ struct Round {
 
 /// With fewer images in round one, good robots are lost by chance; with more, it takes longer.
 const ROUNDS: [Round; 3] = [
-    Round { image_share: 0.1, robot_share: 1.0 },
-    Round { image_share: 0.3, robot_share: 1.0 / 3.0 },
-    Round { image_share: 1.0, robot_share: 0.1 },
+    Round {
+        image_share: 0.1,
+        robot_share: 1.0,
+    },
+    Round {
+        image_share: 0.3,
+        robot_share: 1.0 / 3.0,
+    },
+    Round {
+        image_share: 1.0,
+        robot_share: 0.1,
+    },
 ];
 
 /// The settings of a choice.
@@ -80,7 +89,12 @@ pub(crate) fn validate(
     let config = &source.run.config;
     let count = options.best.unwrap_or(config.validation.best);
     let whereabouts = Whereabouts::given(session.folder()).and_of(&source.path);
-    let dataset = load_dataset_of(Some(&source.run.dataset), config, &whereabouts, &[Split::Train])?;
+    let dataset = load_dataset_of(
+        Some(&source.run.dataset),
+        config,
+        &whereabouts,
+        &[Split::Train],
+    )?;
     ranked(&source, count, &dataset, session)
 }
 
@@ -109,9 +123,18 @@ fn ranked(
     let walker = HeldOutRun::new(config, control_steps, 0, session)?;
     let chosen = Selection::Validated(count).of(std::slice::from_ref(source), 0)?;
     let skilled = |robot: &&Robot| held_out_run::task_of(&grouping, robot).is_some();
-    let robots = chosen.iter().map(|chosen| chosen.robot).filter(skilled).collect();
+    let robots = chosen
+        .iter()
+        .map(|chosen| chosen.robot)
+        .filter(skilled)
+        .collect();
     let images = config.validation.images;
-    let wanted = Wanted { count, images, argument: None, threshold: answer::THRESHOLD };
+    let wanted = Wanted {
+        count,
+        images,
+        argument: None,
+        threshold: answer::THRESHOLD,
+    };
     let best = best(source, dataset, &grouping, robots, &wanted, &walker)?;
     Ok(best.map(|best| best.into_iter().map(|(_, validated)| validated).collect()))
 }
@@ -132,17 +155,36 @@ pub(crate) fn chosen<'a>(
 ) -> Result<Option<Vec<(Chosen<'a>, Validated)>>, Error> {
     let mut all = Vec::new();
     for (number, source) in sources.iter().enumerate() {
-        let own = robots.iter().filter(|chosen| chosen.source == number).map(|chosen| chosen.robot).collect();
+        let own = robots
+            .iter()
+            .filter(|chosen| chosen.source == number)
+            .map(|chosen| chosen.robot)
+            .collect();
         let is_physical = matches!(selection, Selection::Physical(_));
         // Some may not be physical: validate as many as the run does at its end.
-        let count =
-            if is_physical { wanted.count.max(source.run.config.validation.best) } else { wanted.count };
+        let count = if is_physical {
+            wanted.count.max(source.run.config.validation.best)
+        } else {
+            wanted.count
+        };
         let searched = Wanted { count, ..*wanted };
         let Some(ranked) = best(source, dataset, grouping, own, &searched, &walker()?)? else {
             return Ok(None);
         };
-        let ranked = if is_physical { first_physical(ranked, source, wanted.count)? } else { ranked };
-        all.extend(ranked.into_iter().map(|(robot, score)| (Chosen { source: number, robot }, score)));
+        let ranked = if is_physical {
+            first_physical(ranked, source, wanted.count)?
+        } else {
+            ranked
+        };
+        all.extend(ranked.into_iter().map(|(robot, score)| {
+            (
+                Chosen {
+                    source: number,
+                    robot,
+                },
+                score,
+            )
+        }));
     }
     Ok(Some(all))
 }
@@ -162,20 +204,39 @@ pub(crate) fn best<'a>(
     let run = &source.run;
     let images = images(&[run], dataset, wanted.argument, wanted.images)?;
     // If fewer are wanted than the run chooses at its end, return the first of those.
-    let searched = &Wanted { count: wanted.count.max(run.config.validation.best), ..*wanted };
-    let shown = (dataset.fingerprint(Split::Train).expect("its images were drawn just now"), &images[..]);
+    let searched = &Wanted {
+        count: wanted.count.max(run.config.validation.best),
+        ..*wanted
+    };
+    let shown = (
+        dataset
+            .fingerprint(Split::Train)
+            .expect("its images were drawn just now"),
+        &images[..],
+    );
     let key = key(run, &robots, searched, shown, walker.control_steps);
     let path = source.path.with_file_name(VALIDATION_JSON);
     let known = ValidationFile::read(&path)?;
     let by_id = |validated: &Validated| {
-        let robot = robots.iter().find(|robot| robot.id == validated.id && robot.task == validated.task)?;
+        let robot = robots
+            .iter()
+            .find(|robot| robot.id == validated.id && robot.task == validated.task)?;
         Some((*robot, validated.clone()))
     };
     let first = |all: &[Validated]| {
-        let before =
-            |place: usize, task: &str| all[..place].iter().filter(|other| other.task == task).count();
-        let is_first = |(place, robot): &(usize, &Validated)| before(*place, &robot.task) < wanted.count;
-        all.iter().enumerate().filter(is_first).filter_map(|(_, robot)| by_id(robot)).collect()
+        let before = |place: usize, task: &str| {
+            all[..place]
+                .iter()
+                .filter(|other| other.task == task)
+                .count()
+        };
+        let is_first =
+            |(place, robot): &(usize, &Validated)| before(*place, &robot.task) < wanted.count;
+        all.iter()
+            .enumerate()
+            .filter(is_first)
+            .filter_map(|(_, robot)| by_id(robot))
+            .collect()
     };
     if let Some(robots) = known.as_ref().and_then(|file| file.of(&key)) {
         return Ok(Some(first(robots)));
@@ -185,25 +246,34 @@ pub(crate) fn best<'a>(
     };
     let found = first(&chosen);
     let run_sha256 = run.fingerprint();
-    let mut file = known.filter(|file| file.run_sha256 == run_sha256).unwrap_or_else(|| ValidationFile {
-        format: FORMAT.0.to_string(),
-        format_version: FORMAT.1,
-        run_sha256,
-        key: String::new(),
-        robots: Vec::new(),
-        others: Vec::new(),
-    });
+    let mut file = known
+        .filter(|file| file.run_sha256 == run_sha256)
+        .unwrap_or_else(|| ValidationFile {
+            format: FORMAT.0.to_string(),
+            format_version: FORMAT.1,
+            run_sha256,
+            key: String::new(),
+            robots: Vec::new(),
+            others: Vec::new(),
+        });
     match is_own(run, &robots, searched, walker.control_steps) {
         true => (file.key, file.robots) = (key, chosen),
-        false => file.others.push(Ranking { key, robots: chosen }),
+        false => file.others.push(Ranking {
+            key,
+            robots: chosen,
+        }),
     }
-    let text = serde_json::to_string(&file).map_err(|error| Error::other(error.to_string()))? + "\n";
+    let text =
+        serde_json::to_string(&file).map_err(|error| Error::other(error.to_string()))? + "\n";
     if let Err(error) = write_atomically(&path, text.as_bytes()) {
         let error = Error::writing(&path, &error);
         if error.kind == ErrorKind::Lost {
             return Err(error);
         }
-        walker.session.observer.warning(&format!("{error}; the next time robots are chosen anew"));
+        walker
+            .session
+            .observer
+            .warning(&format!("{error}; the next time robots are chosen anew"));
     }
     Ok(Some(found))
 }
@@ -214,8 +284,16 @@ fn is_own(run: &RunFile, robots: &[&Robot], wanted: &Wanted, control_steps: u32)
     let Ok(grouping) = run.config.grouping() else {
         return false;
     };
-    let all = run.elites.iter().filter(|robot| held_out_run::task_of(&grouping, robot).is_some()).count();
-    let usual = (images, answer::THRESHOLD, held_out_run::control_steps(&run.config, held_out_run::CYCLES));
+    let all = run
+        .elites
+        .iter()
+        .filter(|robot| held_out_run::task_of(&grouping, robot).is_some())
+        .count();
+    let usual = (
+        images,
+        answer::THRESHOLD,
+        held_out_run::control_steps(&run.config, held_out_run::CYCLES),
+    );
     (wanted.images, wanted.threshold, control_steps) == usual
         && (best == 0 || wanted.count == best)
         && robots.len() == all
@@ -231,7 +309,9 @@ fn key(
 ) -> String {
     let ids: Vec<&str> = robots.iter().map(|robot| robot.id.as_str()).collect();
     let images: Vec<usize> = images.iter().map(|image| image.index).collect();
-    let Wanted { count, threshold, .. } = wanted;
+    let Wanted {
+        count, threshold, ..
+    } = wanted;
     sha256_hex(
         format!(
             "{} {} {data} {ids:?} {count} {images:?} {threshold} {control_steps}",
@@ -244,10 +324,22 @@ fn key(
 
 /// Returns the numbers of robots and images in each round; classes alternate, so each has an image.
 fn rounds(robots: usize, count: usize, (images, classes): (usize, usize)) -> [(usize, usize); 3] {
-    ROUNDS.map(|Round { image_share, robot_share }| {
-        let kept = ((robots as f64 * robot_share).ceil() as usize).max(count).min(robots);
-        (kept, ((images as f64 * image_share).ceil() as usize).max(classes).min(images))
-    })
+    ROUNDS.map(
+        |Round {
+             image_share,
+             robot_share,
+         }| {
+            let kept = ((robots as f64 * robot_share).ceil() as usize)
+                .max(count)
+                .min(robots);
+            (
+                kept,
+                ((images as f64 * image_share).ceil() as usize)
+                    .max(classes)
+                    .min(images),
+            )
+        },
+    )
 }
 
 fn screened(
@@ -255,21 +347,29 @@ fn screened(
     dataset: &Dataset,
     grouping: &Grouping,
     robots: &[&Robot],
-    &Wanted { count, threshold, .. }: &Wanted,
+    &Wanted {
+        count, threshold, ..
+    }: &Wanted,
     images: &[ImageRef],
     walker: &HeldOutRun,
 ) -> Result<Option<Vec<Validated>>, Error> {
     let config: &Config = &run.config;
     let stimuli = see_all(config, dataset, Split::Train, images)?;
     let split_of = |robot: &Robot| -> Option<&grouping::ClassSplit> {
-        grouping.tasks().iter().find(|split| split.is_called(&robot.task))
+        grouping
+            .tasks()
+            .iter()
+            .find(|split| split.is_called(&robot.task))
     };
     let mut tasks = BTreeMap::<&str, Vec<&Robot>>::new();
-    robots.iter().for_each(|robot| tasks.entry(&robot.task).or_default().push(robot));
+    robots
+        .iter()
+        .for_each(|robot| tasks.entry(&robot.task).or_default().push(robot));
     let of = (images.len(), config.classes().len());
     let showings = |all: &Vec<&Robot>| {
         let mut before = 0;
-        rounds(all.len(), count, of).map(|(robots, shown)| robots * (shown - replace(&mut before, shown)))
+        rounds(all.len(), count, of)
+            .map(|(robots, shown)| robots * (shown - replace(&mut before, shown)))
     };
     let showings = tasks.values().flat_map(showings);
     walker.validating(robots.len(), images.len(), showings.sum::<usize>() as u64);
@@ -285,25 +385,41 @@ fn screened(
                 let Some(split) = split_of(robot) else {
                     continue;
                 };
-                let Some((others, _)) = walker.rollouts(robot, &stimuli[displacements.len()..shown]) else {
+                let Some((others, _)) =
+                    walker.rollouts(robot, &stimuli[displacements.len()..shown])
+                else {
                     return Ok(None);
                 };
                 displacements.extend(others);
-                let trial = Trial { run, robot, split, images: &images[..shown], threshold };
+                let trial = Trial {
+                    run,
+                    robot,
+                    split,
+                    images: &images[..shown],
+                    threshold,
+                };
                 scores.push((robot, RobotReport::new(&trial, displacements, 0)));
             }
             // The sort is stable: ties keep the order of the round before, at first that of
             // fitness.
             scores.sort_by(|(_, a), (_, b)| b.balanced_accuracy.total_cmp(&a.balanced_accuracy));
-            left = scores.iter().map(|(robot, report)| (*robot, report.displacements.clone())).collect();
+            left = scores
+                .iter()
+                .map(|(robot, report)| (*robot, report.displacements.clone()))
+                .collect();
         }
-        chosen.extend(scores.into_iter().take(count).map(|(robot, report)| Validated {
-            id: robot.id.clone(),
-            task: robot.task.clone(),
-            images: report.images,
-            right: report.right,
-            balanced_accuracy: report.balanced_accuracy,
-        }));
+        chosen.extend(
+            scores
+                .into_iter()
+                .take(count)
+                .map(|(robot, report)| Validated {
+                    id: robot.id.clone(),
+                    task: robot.task.clone(),
+                    images: report.images,
+                    right: report.right,
+                    balanced_accuracy: report.balanced_accuracy,
+                }),
+        );
     }
     Ok(Some(chosen))
 }

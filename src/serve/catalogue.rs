@@ -211,7 +211,14 @@ impl RobotCatalogue {
         {
             notes.push(format!("{error}; left out"));
         }
-        Ok((RobotCatalogue { built_in, known: Mutex::new(watch.known()), watch: Mutex::new(watch) }, notes))
+        Ok((
+            RobotCatalogue {
+                built_in,
+                known: Mutex::new(watch.known()),
+                watch: Mutex::new(watch),
+            },
+            notes,
+        ))
     }
 
     /// Returns the current archives, or the last known ones while another request polls.
@@ -221,7 +228,8 @@ impl RobotCatalogue {
             Err(TryLockError::Poisoned(watch)) => Some(watch.into_inner()),
             Err(TryLockError::WouldBlock) => None,
         };
-        let is_due = |watch: &MutexGuard<Watch>| watch.looked.is_none_or(|at| at.elapsed() >= LOOK_EVERY);
+        let is_due =
+            |watch: &MutexGuard<Watch>| watch.looked.is_none_or(|at| at.elapsed() >= LOOK_EVERY);
         let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(mut watch) = watch.filter(is_due) {
             watch.look();
@@ -246,17 +254,25 @@ impl RobotCatalogue {
         };
         let archives = self.archives();
         let built_in = self.built_in.iter().map(|from| (&**from, None, 0));
-        let read = archives.iter().map(|Known { collection, changes }| {
-            (&**collection, Some(collection.config.generations), *changes)
-        });
+        let read = archives.iter().map(
+            |Known {
+                 collection,
+                 changes,
+             }| { (&**collection, Some(collection.config.generations), *changes) },
+        );
         let list = built_in.chain(read).map(short).enumerate();
-        list.map(|(index, summary)| CollectionSummary { index, ..summary }).collect()
+        list.map(|(index, summary)| CollectionSummary { index, ..summary })
+            .collect()
     }
 
     /// Returns all collections.
     pub(crate) fn collections(&self) -> Vec<Arc<Collection>> {
         let archives = self.archives();
-        self.built_in.iter().chain(archives.iter().map(|known| &known.collection)).cloned().collect()
+        self.built_in
+            .iter()
+            .chain(archives.iter().map(|known| &known.collection))
+            .cloned()
+            .collect()
     }
 
     /// Returns a collection by its number.
@@ -265,8 +281,12 @@ impl RobotCatalogue {
     /// Returns an error if there is no such collection.
     pub(crate) fn collection(&self, index: usize) -> Result<Arc<Collection>, HttpRefusal> {
         let collections = self.collections();
-        let unknown =
-            || HttpRefusal::Unknown(format!("there is no archive {index}: there are {}", collections.len()));
+        let unknown = || {
+            HttpRefusal::Unknown(format!(
+                "there is no archive {index}: there are {}",
+                collections.len()
+            ))
+        };
         collections.get(index).cloned().ok_or_else(unknown)
     }
 
@@ -277,9 +297,13 @@ impl RobotCatalogue {
     pub(crate) fn course(&self, index: usize) -> Result<Course, HttpRefusal> {
         let collection = self.collection(index)?;
         let Some(path) = &collection.path else {
-            return Err(HttpRefusal::Unknown(format!("{}: it is no run", collection.name)));
+            return Err(HttpRefusal::Unknown(format!(
+                "{}: it is no run",
+                collection.name
+            )));
         };
-        Course::of(path, collection.config.generations).map_err(|error| HttpRefusal::Unknown(error.message))
+        Course::of(path, collection.config.generations)
+            .map_err(|error| HttpRefusal::Unknown(error.message))
     }
 }
 
@@ -298,12 +322,22 @@ impl Watch {
 
     fn add(&mut self, path: &Path, stamps: Stamps, collection: Collection) {
         self.paths.extend([path.to_path_buf(), real(path)]);
-        let known = Known { collection: Arc::new(collection), changes: 0 };
-        self.watched.push(Watched { path: path.to_path_buf(), stamps, known });
+        let known = Known {
+            collection: Arc::new(collection),
+            changes: 0,
+        };
+        self.watched.push(Watched {
+            path: path.to_path_buf(),
+            stamps,
+            known,
+        });
     }
 
     fn known(&self) -> Arc<[Known]> {
-        self.watched.iter().map(|watched| watched.known.clone()).collect()
+        self.watched
+            .iter()
+            .map(|watched| watched.known.clone())
+            .collect()
     }
 
     /// Reloads changed archives, and adds runs that have begun.
@@ -328,10 +362,14 @@ impl Watch {
 
     /// Returns unknown runs written since the page was opened, sorted by name.
     fn begun(&self) -> Vec<PathBuf> {
-        let folders = std::fs::read_dir(&self.runs).into_iter().flatten().flatten();
+        let folders = std::fs::read_dir(&self.runs)
+            .into_iter()
+            .flatten()
+            .flatten();
         let files = folders.map(|folder| folder.path().join(RUN_JSON));
         let files = files.filter(|path| !self.paths.contains(path));
-        let is_new = |path: &PathBuf| stamp(path).is_some_and(|(modified, _)| modified >= self.opened);
+        let is_new =
+            |path: &PathBuf| stamp(path).is_some_and(|(modified, _)| modified >= self.opened);
         let mut begun: Vec<PathBuf> = files.filter(is_new).collect();
         begun.sort();
         begun
@@ -349,8 +387,15 @@ impl Watched {
         self.stamps = now;
         if let Ok(collection) = read {
             let Collection { robots, gone, .. } = &*self.known.collection;
-            let mut known: HashSet<&str> = collection.robots.iter().map(|robot| robot.id.as_str()).collect();
-            let gone = robots.iter().chain(gone).filter(|robot| known.insert(&robot.id));
+            let mut known: HashSet<&str> = collection
+                .robots
+                .iter()
+                .map(|robot| robot.id.as_str())
+                .collect();
+            let gone = robots
+                .iter()
+                .chain(gone)
+                .filter(|robot| known.insert(&robot.id));
             let gone = gone.take(MOST_GONE).cloned().collect();
             self.known.collection = Arc::new(Collection { gone, ..collection });
             self.known.changes += 1;
@@ -372,8 +417,13 @@ impl Collection {
     /// # Errors
     /// Returns an error if there is no such robot.
     pub(crate) fn robot(&self, id: &str) -> Result<&Entry, HttpRefusal> {
-        let found = self.robots.iter().chain(&self.gone).find(|robot| robot.id == id);
-        found.ok_or_else(|| HttpRefusal::Unknown(format!("{}: there is no robot {id:?}", self.name)))
+        let found = self
+            .robots
+            .iter()
+            .chain(&self.gone)
+            .find(|robot| robot.id == id);
+        found
+            .ok_or_else(|| HttpRefusal::Unknown(format!("{}: there is no robot {id:?}", self.name)))
     }
 
     /// Returns a robot by its id, with everything that its simulation depends on.
@@ -403,7 +453,10 @@ fn published() -> Result<Collection, Error> {
     let entry = |robot: published::Published| Entry {
         judge: Some(robot.judge()),
         id: robot.name,
-        task: tasks.first().expect("the published robots perform a task").clone(),
+        task: tasks
+            .first()
+            .expect("the published robots perform a task")
+            .clone(),
         fitness: robot.fitness,
         voxels: robot.body.counts(),
         cell: Vec::new(),
@@ -434,14 +487,25 @@ fn trained(set: &str, name: &str) -> Result<Collection, Error> {
     for (run, audit) in published::trained(set)? {
         all.push(of_run(run, Some(&audit))?);
     }
-    let mut robots: Vec<Entry> = all.iter_mut().flat_map(|one| std::mem::take(&mut one.robots)).collect();
+    let mut robots: Vec<Entry> = all
+        .iter_mut()
+        .flat_map(|one| std::mem::take(&mut one.robots))
+        .collect();
     fittest_first(&mut robots);
     let mut tasks: Vec<String> = all.iter().flat_map(|one| one.tasks.clone()).collect();
     tasks.dedup();
     let first = all.swap_remove(0);
     let name = name.to_string();
     // Cells belong to a single run.
-    Ok(Collection { name, generations: None, dataset: None, bins: Vec::new(), tasks, robots, ..first })
+    Ok(Collection {
+        name,
+        generations: None,
+        dataset: None,
+        bins: Vec::new(),
+        tasks,
+        robots,
+        ..first
+    })
 }
 
 fn archive(run: RunFile, path: &Path, notes: &mut Vec<String>) -> Result<Collection, Error> {
@@ -449,13 +513,19 @@ fn archive(run: RunFile, path: &Path, notes: &mut Vec<String>) -> Result<Collect
         notes.push(error.message);
         None
     });
-    Ok(Collection { path: Some(path.to_path_buf()), ..of_run(run, audit.as_ref())? })
+    Ok(Collection {
+        path: Some(path.to_path_buf()),
+        ..of_run(run, audit.as_ref())?
+    })
 }
 
 fn of_run(run: RunFile, audit: Option<&AuditFile>) -> Result<Collection, Error> {
     let audited = |robot: &Robot| {
         let found = audit?.robot(&robot.id)?;
-        Some(Audited { verdict: found.verdict.name(), conclusion: found.conclusion() })
+        Some(Audited {
+            verdict: found.verdict.name(),
+            conclusion: found.conclusion(),
+        })
     };
     let entry = |robot: &Robot| Entry {
         id: robot.id.clone(),
@@ -499,7 +569,8 @@ mod tests {
         std::fs::write(&path, text).unwrap();
         // File-system clocks tick more coarsely than the system's.
         let file = File::options().write(true).open(&path).unwrap();
-        file.set_modified(SystemTime::now() + Duration::from_secs(10)).unwrap();
+        file.set_modified(SystemTime::now() + Duration::from_secs(10))
+            .unwrap();
         path
     }
 
@@ -526,17 +597,28 @@ mod tests {
         let file = File::options().write(true).open(&path).unwrap();
         file.set_modified(modified).unwrap();
         assert_eq!(known(&catalogue), [""; 0]);
-        file.set_modified(modified + Duration::from_millis(1)).unwrap();
+        file.set_modified(modified + Duration::from_millis(1))
+            .unwrap();
         assert_eq!(known(&catalogue), ["a"]);
         // So does an archive that was readable before.
         write(runs.path(), "a", &good.replacen('{', "[", 1));
         file.set_modified(modified).unwrap();
-        assert_eq!((known(&catalogue), catalogue.list()[3].changes), (vec!["a".to_string()], 0));
+        assert_eq!(
+            (known(&catalogue), catalogue.list()[3].changes),
+            (vec!["a".to_string()], 0)
+        );
         write(runs.path(), "a", good);
         file.set_modified(modified).unwrap();
-        assert_eq!((known(&catalogue), catalogue.list()[3].changes), (vec!["a".to_string()], 0));
-        file.set_modified(modified + Duration::from_millis(1)).unwrap();
-        assert_eq!((known(&catalogue), catalogue.list()[3].changes), (vec!["a".to_string()], 1));
+        assert_eq!(
+            (known(&catalogue), catalogue.list()[3].changes),
+            (vec!["a".to_string()], 0)
+        );
+        file.set_modified(modified + Duration::from_millis(1))
+            .unwrap();
+        assert_eq!(
+            (known(&catalogue), catalogue.list()[3].changes),
+            (vec!["a".to_string()], 1)
+        );
     }
 
     #[test]
@@ -545,7 +627,10 @@ mod tests {
         let (catalogue, _) = RobotCatalogue::open(&[], None, runs.path()).unwrap();
         write(runs.path(), "a", run());
         let reads = catalogue.watch.lock().unwrap();
-        assert_eq!((catalogue.list().len(), catalogue.collections().len()), (3, 3));
+        assert_eq!(
+            (catalogue.list().len(), catalogue.collections().len()),
+            (3, 3)
+        );
         assert!(catalogue.collection(0).is_ok() && catalogue.course(0).is_err());
         drop(reads);
         assert_eq!(known(&catalogue), ["a"]);
@@ -556,7 +641,8 @@ mod tests {
     fn a_run_by_several_names_is_listed_once() {
         let runs = tempfile::tempdir().unwrap();
         let path = write(runs.path(), "a", run());
-        let (catalogue, _) = RobotCatalogue::open(std::slice::from_ref(&path), None, runs.path()).unwrap();
+        let (catalogue, _) =
+            RobotCatalogue::open(std::slice::from_ref(&path), None, runs.path()).unwrap();
         std::os::unix::fs::symlink("a", runs.path().join("link")).unwrap();
         write(runs.path(), "a", run());
         assert_eq!(known(&catalogue), ["a"]);

@@ -39,16 +39,24 @@ impl Course {
     /// Returns an error if its `metrics.csv` exists and cannot be read.
     pub(crate) fn of(archive: &Path, asked: u64) -> Result<Self, Error> {
         // Runs of the gallery and the atlas lack this file, as do runs that just began.
-        let moments = if exists(&archive.with_file_name(METRICS)) { moments(archive)? } else { Vec::new() };
+        let moments = if exists(&archive.with_file_name(METRICS)) {
+            moments(archive)?
+        } else {
+            Vec::new()
+        };
         let done = moments.len();
         let left = asked.saturating_sub(done as u64);
         // Extrapolates from its last fifth.
         let fifth = (done / 5).max(1);
-        let since =
-            done.checked_sub(fifth + 1).map(|before| moments[done - 1].seconds - moments[before].seconds);
-        let seconds_left = since.filter(|_| left > 0).map(|seconds| seconds / fifth as f64 * left as f64);
+        let since = done
+            .checked_sub(fifth + 1)
+            .map(|before| moments[done - 1].seconds - moments[before].seconds);
+        let seconds_left = since
+            .filter(|_| left > 0)
+            .map(|seconds| seconds / fifth as f64 * left as f64);
         let generation = thinned(done);
-        let of = |value: fn(&Moment) -> f64| generation.iter().map(|k| value(&moments[*k])).collect();
+        let of =
+            |value: fn(&Moment) -> f64| generation.iter().map(|k| value(&moments[*k])).collect();
         Ok(Course {
             done,
             asked,

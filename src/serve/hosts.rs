@@ -34,7 +34,10 @@ impl FromStr for HostName {
 
 /// Parses an address as written in a URL: IPv6 in brackets.
 fn address(host: &str) -> Option<IpAddr> {
-    match host.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')) {
+    match host
+        .strip_prefix('[')
+        .and_then(|rest| rest.strip_suffix(']'))
+    {
         Some(inner) => inner.parse().ok().map(IpAddr::V6),
         None => host.parse().ok().map(IpAddr::V4),
     }
@@ -67,14 +70,21 @@ impl Hosts {
             return Err(HttpResponse::refusal(400, "expected a Host header"));
         };
         if !host_of(host).is_some_and(|name| self.allows(&name)) {
-            let text = format!("Host: {host}: expected localhost or 127.0.0.1; {}", self.advice);
+            let text = format!(
+                "Host: {host}: expected localhost or 127.0.0.1; {}",
+                self.advice
+            );
             return Err(HttpResponse::refusal(403, &text));
         }
         // Programs like curl send no Origin; browsers always do where it matters.
-        let origin = request.header("origin")?.filter(|_| request.method == "POST");
+        let origin = request
+            .header("origin")?
+            .filter(|_| request.method == "POST");
         // A proxy may use https where this server does not.
         let is_own = |origin: &str| {
-            let sender = origin.strip_prefix("http://").or_else(|| origin.strip_prefix("https://"));
+            let sender = origin
+                .strip_prefix("http://")
+                .or_else(|| origin.strip_prefix("https://"));
             sender.is_some_and(|sender| sender.eq_ignore_ascii_case(host))
         };
         match origin {
@@ -104,7 +114,14 @@ mod tests {
     fn names_of_this_machine_are_allowed_on_any_port_and_others_only_if_the_user_says_so() {
         let hosts = Hosts::new(vec!["Hub.example.org".parse().unwrap()], "");
         let allows = |header: &str| host_of(header).is_some_and(|name| hosts.allows(&name));
-        for own in ["localhost", "LOCALHOST:9000", "127.0.0.1:1", "127.0.0.1", "[::1]", "[::1]:65535"] {
+        for own in [
+            "localhost",
+            "LOCALHOST:9000",
+            "127.0.0.1:1",
+            "127.0.0.1",
+            "[::1]",
+            "[::1]:65535",
+        ] {
             assert!(allows(own), "{own}");
         }
         assert!(allows("hub.example.org") && allows("HUB.example.org:8443"));
@@ -140,7 +157,17 @@ mod tests {
 
     #[test]
     fn a_name_has_neither_scheme_nor_port_nor_wildcard() {
-        for wrong in ["", "http://hub", "hub:80", "hub/", "*", "*.example.org", "a b", "größe", "[x]"] {
+        for wrong in [
+            "",
+            "http://hub",
+            "hub:80",
+            "hub/",
+            "*",
+            "*.example.org",
+            "a b",
+            "größe",
+            "[x]",
+        ] {
             assert!(wrong.parse::<HostName>().is_err(), "{wrong}");
         }
         for right in ["hub", "hub-1.example.org", "10.0.0.1", "[fe80::1]"] {

@@ -44,14 +44,23 @@ impl Request {
         let first = found.next().map(|(_, value)| value.as_str());
         match found.next() {
             None => Ok(first),
-            Some(_) => Err(HttpResponse::refusal(400, &format!("expected one header {name}, found several"))),
+            Some(_) => Err(HttpResponse::refusal(
+                400,
+                &format!("expected one header {name}, found several"),
+            )),
         }
     }
 
     /// Returns a value of the query, undecoded.
     pub(crate) fn asked(&self, key: &str) -> Option<&str> {
-        let pairs = self.query.split('&').filter_map(|pair| pair.split_once('='));
-        pairs.into_iter().find(|(own, _)| *own == key).map(|(_, value)| value)
+        let pairs = self
+            .query
+            .split('&')
+            .filter_map(|pair| pair.split_once('='));
+        pairs
+            .into_iter()
+            .find(|(own, _)| *own == key)
+            .map(|(_, value)| value)
     }
 }
 
@@ -68,31 +77,54 @@ pub(crate) struct HttpResponse {
 impl HttpResponse {
     /// Creates the response for an embedded file.
     pub(crate) fn file(content_type: &'static str, text: &str) -> Self {
-        HttpResponse { status: 200, content_type, body: text.as_bytes().to_vec(), allow: None }
+        HttpResponse {
+            status: 200,
+            content_type,
+            body: text.as_bytes().to_vec(),
+            allow: None,
+        }
     }
 
     /// Creates a JSON response.
     pub(crate) fn json(value: &impl Serialize) -> Self {
         match serde_json::to_vec(value) {
-            Ok(body) => HttpResponse { status: 200, content_type: "application/json", body, allow: None },
+            Ok(body) => HttpResponse {
+                status: 200,
+                content_type: "application/json",
+                body,
+                allow: None,
+            },
             Err(error) => HttpResponse::refusal(500, &error.to_string()),
         }
     }
 
     /// Creates a response without content.
     pub(crate) fn done() -> Self {
-        HttpResponse { status: 204, content_type: "text/plain; charset=utf-8", body: Vec::new(), allow: None }
+        HttpResponse {
+            status: 204,
+            content_type: "text/plain; charset=utf-8",
+            body: Vec::new(),
+            allow: None,
+        }
     }
 
     /// Creates an error response of one line.
     pub(crate) fn refusal(status: u16, line: &str) -> Self {
         let body = format!("{}\n", one_line(line)).into_bytes();
-        HttpResponse { status, content_type: "text/plain; charset=utf-8", body, allow: None }
+        HttpResponse {
+            status,
+            content_type: "text/plain; charset=utf-8",
+            body,
+            allow: None,
+        }
     }
 
     /// Creates the response to a request with a wrong method.
     pub(crate) fn wrong_method(allow: &'static str) -> Self {
-        HttpResponse { allow: Some(allow), ..HttpResponse::refusal(405, &format!("expected {allow}")) }
+        HttpResponse {
+            allow: Some(allow),
+            ..HttpResponse::refusal(405, &format!("expected {allow}"))
+        }
     }
 
     /// Sends the response; only the head if `head_only`, in answer to HEAD.
@@ -100,10 +132,13 @@ impl HttpResponse {
     /// # Errors
     /// Returns an error if the reader has gone.
     pub(crate) fn send(&self, stream: &mut TcpStream, head_only: bool) -> io::Result<()> {
-        let allow = self.allow.map_or(String::new(), |methods| format!("Allow: {methods}\r\n"));
+        let allow = self
+            .allow
+            .map_or(String::new(), |methods| format!("Allow: {methods}\r\n"));
         let length = format!("Content-Length: {}\r\n", self.body.len());
         let length = if self.status == 204 { "" } else { &length };
-        let mut text = head(self.status, self.content_type, &format!("{length}{allow}")).into_bytes();
+        let mut text =
+            head(self.status, self.content_type, &format!("{length}{allow}")).into_bytes();
         if !head_only {
             text.extend_from_slice(&self.body);
         }
@@ -153,10 +188,13 @@ pub(crate) fn begin_events(stream: &mut TcpStream) -> io::Result<()> {
 /// # Errors
 /// Returns the refusal to send if the data are no valid request.
 pub(crate) fn read(stream: &mut TcpStream) -> Result<Option<Request>, HttpResponse> {
-    let broken =
-        |error: &io::Error| HttpResponse::refusal(400, &format!("the request cannot be read: {error}"));
+    let broken = |error: &io::Error| {
+        HttpResponse::refusal(400, &format!("the request cannot be read: {error}"))
+    };
     let deadline = Instant::now() + TO_READ;
-    stream.set_write_timeout(Some(TO_WRITE)).map_err(|error| broken(&error))?;
+    stream
+        .set_write_timeout(Some(TO_WRITE))
+        .map_err(|error| broken(&error))?;
     let mut bytes = Vec::new();
     let (mut request, begin) = loop {
         let found = parse(&bytes)?;
@@ -173,7 +211,10 @@ pub(crate) fn read(stream: &mut TcpStream) -> Result<Option<Request>, HttpRespon
             // Browsers open connections that they then do not use.
             Err(_) if bytes.is_empty() => return Ok(None),
             Err(_) => {
-                return Err(HttpResponse::refusal(408, "the request did not come in time"));
+                return Err(HttpResponse::refusal(
+                    408,
+                    "the request did not come in time",
+                ));
             }
         }
     };
@@ -183,7 +224,10 @@ pub(crate) fn read(stream: &mut TcpStream) -> Result<Option<Request>, HttpRespon
             Ok(0) => return Err(HttpResponse::refusal(400, "the request ends in its body")),
             Ok(_) => {}
             Err(_) => {
-                return Err(HttpResponse::refusal(408, "the request did not come in time"));
+                return Err(HttpResponse::refusal(
+                    408,
+                    "the request did not come in time",
+                ));
             }
         }
     }
@@ -211,19 +255,31 @@ fn parse(bytes: &[u8]) -> Result<Option<(Request, usize)>, HttpResponse> {
         Ok(httparse::Status::Complete(begin)) => begin,
         Ok(httparse::Status::Partial) => return Ok(None),
         Err(httparse::Error::TooManyHeaders) => {
-            return Err(HttpResponse::refusal(431, &format!("expected at most {MAX_HEADERS} headers")));
+            return Err(HttpResponse::refusal(
+                431,
+                &format!("expected at most {MAX_HEADERS} headers"),
+            ));
         }
         Err(error) => {
-            return Err(HttpResponse::refusal(400, &format!("not an HTTP request: {error}")));
+            return Err(HttpResponse::refusal(
+                400,
+                &format!("not an HTTP request: {error}"),
+            ));
         }
     };
     let target = head.path.expect("a head that is whole has a path");
     let (path, query) = target.split_once('?').unwrap_or((target, ""));
     let lower = |header: &httparse::Header| {
-        (header.name.to_ascii_lowercase(), String::from_utf8_lossy(header.value).trim().to_string())
+        (
+            header.name.to_ascii_lowercase(),
+            String::from_utf8_lossy(header.value).trim().to_string(),
+        )
     };
     let request = Request {
-        method: head.method.expect("a head that is whole has a method").to_string(),
+        method: head
+            .method
+            .expect("a head that is whole has a method")
+            .to_string(),
         path: path.to_string(),
         query: query.to_string(),
         headers: head.headers.iter().map(lower).collect(),
@@ -233,8 +289,15 @@ fn parse(bytes: &[u8]) -> Result<Option<(Request, usize)>, HttpResponse> {
 }
 
 fn length(request: &Request) -> Result<usize, HttpResponse> {
-    if request.headers.iter().any(|(own, _)| own == "transfer-encoding") {
-        return Err(HttpResponse::refusal(411, "expected a body with a Content-Length"));
+    if request
+        .headers
+        .iter()
+        .any(|(own, _)| own == "transfer-encoding")
+    {
+        return Err(HttpResponse::refusal(
+            411,
+            "expected a body with a Content-Length",
+        ));
     }
     let Some(digits) = request.header("content-length")? else {
         return match request.method.as_str() {
@@ -245,10 +308,14 @@ fn length(request: &Request) -> Result<usize, HttpResponse> {
     let digits = Some(digits).filter(|text| text.bytes().all(|b| b.is_ascii_digit()));
     match digits.map(str::parse::<usize>) {
         Some(Ok(length)) if length <= MAX_BODY => Ok(length),
-        Some(Ok(_)) => {
-            Err(HttpResponse::refusal(413, &format!("the request's body is longer than {MAX_BODY} bytes")))
-        }
-        _ => Err(HttpResponse::refusal(400, "Content-Length: expected one number")),
+        Some(Ok(_)) => Err(HttpResponse::refusal(
+            413,
+            &format!("the request's body is longer than {MAX_BODY} bytes"),
+        )),
+        _ => Err(HttpResponse::refusal(
+            400,
+            "Content-Length: expected one number",
+        )),
     }
 }
 
@@ -257,7 +324,9 @@ pub(crate) fn close(stream: &mut TcpStream) {
     let _ = stream.shutdown(Shutdown::Write);
     let until = Instant::now() + Duration::from_millis(500);
     let mut rest = Vec::new();
-    while rest.len() <= 2 * MAX_BODY && matches!(more(stream, &mut rest, until), Ok(count) if count > 0) {}
+    while rest.len() <= 2 * MAX_BODY
+        && matches!(more(stream, &mut rest, until), Ok(count) if count > 0)
+    {}
 }
 
 #[cfg(test)]
@@ -266,7 +335,9 @@ mod tests {
 
     fn status(text: &str) -> u16 {
         match parse(text.as_bytes()) {
-            Ok(Some((request, _))) => length(&request).map_or_else(|refusal| refusal.status, |_| 200),
+            Ok(Some((request, _))) => {
+                length(&request).map_or_else(|refusal| refusal.status, |_| 200)
+            }
             Ok(None) => 0,
             Err(refusal) => refusal.status,
         }
@@ -279,22 +350,43 @@ mod tests {
                 .unwrap()
                 .unwrap();
         assert_eq!(
-            (request.path.as_str(), request.asked("d"), request.asked("b")),
+            (
+                request.path.as_str(),
+                request.asked("d"),
+                request.asked("b")
+            ),
             ("/a", Some("e"), Some("c"))
         );
         assert_eq!(
-            (request.header("host").unwrap(), request.header("cookie").is_err(), begin),
+            (
+                request.header("host").unwrap(),
+                request.header("cookie").is_err(),
+                begin
+            ),
             (Some("x"), true, 58)
         );
         assert_eq!(status("GET / HTTP/1.1\r\nHost"), 0);
         assert_eq!(status("GET / HTTP/1.1\r\n\r\n"), 200);
         assert_eq!(status("\u{1}\u{2}\r\n\r\n"), 400);
         assert_eq!(status("GET /\r\n\r\n"), 400);
-        assert_eq!(status(&format!("GET / HTTP/1.1\r\n{}\r\n", "a: b\r\n".repeat(65))), 431);
-        let post = |header: &str| status(&format!("POST / HTTP/1.1\r\n{header}\r\n\r\n"));
-        assert_eq!((post("content-length: 5"), post("a: b"), post("content-length: +5")), (200, 411, 400));
         assert_eq!(
-            (post("content-length: 1\r\ncontent-length: 2"), post("content-length: 99999999")),
+            status(&format!("GET / HTTP/1.1\r\n{}\r\n", "a: b\r\n".repeat(65))),
+            431
+        );
+        let post = |header: &str| status(&format!("POST / HTTP/1.1\r\n{header}\r\n\r\n"));
+        assert_eq!(
+            (
+                post("content-length: 5"),
+                post("a: b"),
+                post("content-length: +5")
+            ),
+            (200, 411, 400)
+        );
+        assert_eq!(
+            (
+                post("content-length: 1\r\ncontent-length: 2"),
+                post("content-length: 99999999")
+            ),
             (400, 413)
         );
         assert_eq!(post("transfer-encoding: chunked"), 411);

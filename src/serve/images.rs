@@ -81,7 +81,10 @@ impl ImageSets {
                 }
                 Err(error) => {
                     // If several runs lack the same folder, only the first reports it.
-                    let run = collection.path.as_ref().map(|path| format!("{}: ", path.display()));
+                    let run = collection
+                        .path
+                        .as_ref()
+                        .map(|path| format!("{}: ", path.display()));
                     let of_run = run.and_then(|run| error.message.strip_prefix(&run));
                     let what = of_run.unwrap_or(&error.message);
                     if notes.iter().all(|(_, told)| !told.ends_with(what)) {
@@ -91,18 +94,26 @@ impl ImageSets {
             }
         }
         sets.push(Dataset::load(BUILTIN, &[], &[Split::Test]).map_err(refuse)?);
-        Ok((ImageSets { sets }, notes.into_iter().map(|(_, note)| note).collect()))
+        Ok((
+            ImageSets { sets },
+            notes.into_iter().map(|(_, note)| note).collect(),
+        ))
     }
 
     /// Summarises all sets.
     pub(crate) fn list(&self) -> Vec<SetSummary> {
         let classes = |set: &Dataset| {
             let classes = set.classes(Split::Test).into_iter();
-            classes.map(|class| (class, set.indices_of(Split::Test, class).len())).collect()
+            classes
+                .map(|class| (class, set.indices_of(Split::Test, class).len()))
+                .collect()
         };
         self.sets
             .iter()
-            .map(|set| SetSummary { name: set.name().to_string(), classes: classes(set) })
+            .map(|set| SetSummary {
+                name: set.name().to_string(),
+                classes: classes(set),
+            })
             .collect()
     }
 
@@ -123,12 +134,20 @@ impl ImageSets {
         count: usize,
     ) -> Result<Vec<TestImage>, HttpRefusal> {
         let dataset = self.set(set)?;
-        let indices = dataset.indices_of(Split::Test, class).iter().skip(from).take(count.min(MAX_PAGE));
+        let indices = dataset
+            .indices_of(Split::Test, class)
+            .iter()
+            .skip(from)
+            .take(count.min(MAX_PAGE));
         indices
             .map(|&index| {
                 let pixels = dataset.image(Split::Test, index);
                 let pixels = pixels.map_err(|error| HttpRefusal::Unknown(error.to_string()))?;
-                Ok(TestImage { index, label: class, pixels })
+                Ok(TestImage {
+                    index,
+                    label: class,
+                    pixels,
+                })
             })
             .collect()
     }
@@ -138,9 +157,14 @@ impl ImageSets {
     /// # Errors
     /// Returns an error if there is no such image.
     pub(crate) fn image(&self, name: &ImageName) -> Result<TestImage, HttpRefusal> {
-        let unknown = |error: crate::data::dataset::DatasetError| HttpRefusal::Unknown(error.to_string());
+        let unknown =
+            |error: crate::data::dataset::DatasetError| HttpRefusal::Unknown(error.to_string());
         let (set, index) = (self.set(&name.set)?, name.index);
         let label = set.label(Split::Test, index).map_err(unknown)?;
-        Ok(TestImage { index, label, pixels: set.image(Split::Test, index).map_err(unknown)? })
+        Ok(TestImage {
+            index,
+            label,
+            pixels: set.image(Split::Test, index).map_err(unknown)?,
+        })
     }
 }

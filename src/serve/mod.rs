@@ -110,12 +110,27 @@ impl Service {
     /// # Errors
     /// Returns an error if an archive is invalid, or the system has no threads left.
     pub fn open(options: &ServeOptions) -> Result<(Self, Vec<String>), Error> {
-        let ServeOptions { archives, newest, data, runs, hosts } = options;
+        let ServeOptions {
+            archives,
+            newest,
+            data,
+            runs,
+            hosts,
+        } = options;
         let (catalogue, mut notes) = RobotCatalogue::open(archives, newest.as_deref(), runs)?;
         let (images, missing) = ImageSets::open(&catalogue, data.as_deref())?;
         notes.extend(missing);
         let (simulations, pool) = (Simulations::default(), threads::pool(None)?);
-        Ok((Service { catalogue, images, simulations, pool, hosts: hosts.clone() }, notes))
+        Ok((
+            Service {
+                catalogue,
+                images,
+                simulations,
+                pool,
+                hosts: hosts.clone(),
+            },
+            notes,
+        ))
     }
 
     /// Returns the current status.
@@ -142,8 +157,19 @@ impl Service {
             (None, _, 0) => Some("without a sensor it is blind"),
             _ => None,
         };
-        let crate::body::VoxelCounts { muscle, sensor, total } = counts;
-        Checked { connected, muscle, sensor, total, problem, note }
+        let crate::body::VoxelCounts {
+            muscle,
+            sensor,
+            total,
+        } = counts;
+        Checked {
+            connected,
+            muscle,
+            sensor,
+            total,
+            problem,
+            note,
+        }
     }
 
     /// Reads a scenario of `morphcog simulate`.
@@ -153,17 +179,22 @@ impl Service {
     pub(crate) fn load(&self, text: &str) -> Result<Loaded, HttpRefusal> {
         let scenario = Scenario::parse(text, "scenario")?;
         if *scenario.physics() != Physics::default() {
-            let text =
-                "scenario: physics: the page has EvoGym's constants only; morphcog simulate takes others";
+            let text = "scenario: physics: the page has EvoGym's constants only; morphcog simulate takes others";
             return Err(HttpRefusal::Wrong(text.to_string()));
         }
-        let Protocol { start_row: row, start_column: column, .. } = Protocol::default();
+        let Protocol {
+            start_row: row,
+            start_column: column,
+            ..
+        } = Protocol::default();
         let starts_here = scenario.start() == Start { row, column };
         let most = u64::from(request::MAX_STEPS);
         let notes: Vec<String> = [
             (scenario.stimuli().len() > 1).then(|| "of its stimuli the first is shown".to_string()),
-            (!starts_here).then(|| format!("it starts in row {row}, column {column}, as all bodies do here")),
-            (scenario.control_steps() > most).then(|| format!("it ends after {most} control steps")),
+            (!starts_here)
+                .then(|| format!("it starts in row {row}, column {column}, as all bodies do here")),
+            (scenario.control_steps() > most)
+                .then(|| format!("it ends after {most} control steps")),
         ]
         .into_iter()
         .flatten()
@@ -180,7 +211,10 @@ impl Service {
     ///
     /// # Errors
     /// Returns an error if the request is invalid.
-    pub(crate) fn plan(&self, request: request::SimulationRequest) -> Result<RolloutPlan, HttpRefusal> {
+    pub(crate) fn plan(
+        &self,
+        request: request::SimulationRequest,
+    ) -> Result<RolloutPlan, HttpRefusal> {
         request.plan(&self.catalogue, &self.images)
     }
 }

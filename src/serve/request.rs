@@ -128,10 +128,18 @@ impl SubjectRequest {
     fn find(self, catalogue: &RobotCatalogue) -> Result<Who, HttpRefusal> {
         let wrong = |text: &str| Err(HttpRefusal::Wrong(text.to_string()));
         match self {
-            SubjectRequest { archive: Some(index), robot: Some(id), body: None, encoding: None } => {
-                catalogue.collection(index)?.who(&id)
-            }
-            SubjectRequest { archive: None, robot: None, body: Some(body), encoding } => {
+            SubjectRequest {
+                archive: Some(index),
+                robot: Some(id),
+                body: None,
+                encoding: None,
+            } => catalogue.collection(index)?.who(&id),
+            SubjectRequest {
+                archive: None,
+                robot: None,
+                body: Some(body),
+                encoding,
+            } => {
                 if !body.is_connected() {
                     return wrong(
                         "subject.body: expected at least one voxel, and all hanging together through their sides",
@@ -143,9 +151,17 @@ impl SubjectRequest {
                     ..StimulusParams::default()
                 });
                 let (physics, protocol) = (Physics::default(), Protocol::default());
-                Ok(Who { body, physics, protocol, encoding, judge: None })
+                Ok(Who {
+                    body,
+                    physics,
+                    protocol,
+                    encoding,
+                    judge: None,
+                })
             }
-            _ => wrong("subject: expected either archive and robot, or body (perhaps with encoding)"),
+            _ => {
+                wrong("subject: expected either archive and robot, or body (perhaps with encoding)")
+            }
         }
     }
 }
@@ -162,37 +178,69 @@ impl ImageChoice {
                 .map_err(|error| HttpRefusal::Wrong(format!("shown: {error}")))
         };
         match self {
-            ImageChoice { drawing: None, image: None, stimulus: None } => {
-                Ok(SeenPixels { stimulus: Grid::filled(height, width, 0.0), label: None })
-            }
-            ImageChoice { drawing: Some(pixels), image: None, stimulus: None } => {
+            ImageChoice {
+                drawing: None,
+                image: None,
+                stimulus: None,
+            } => Ok(SeenPixels {
+                stimulus: Grid::filled(height, width, 0.0),
+                label: None,
+            }),
+            ImageChoice {
+                drawing: Some(pixels),
+                image: None,
+                stimulus: None,
+            } => {
                 let (rows, columns) = (pixels.height(), pixels.width());
                 if rows > MAX_PICTURE || columns > MAX_PICTURE {
                     return Err(HttpRefusal::Wrong(format!(
                         "shown.drawing: {rows} × {columns} pixels, expected at most {MAX_PICTURE} × {MAX_PICTURE}"
                     )));
                 }
-                Ok(SeenPixels { stimulus: reduce(&pixels)?, label: None })
+                Ok(SeenPixels {
+                    stimulus: reduce(&pixels)?,
+                    label: None,
+                })
             }
-            ImageChoice { drawing: None, image: Some(name), stimulus: None } => {
+            ImageChoice {
+                drawing: None,
+                image: Some(name),
+                stimulus: None,
+            } => {
                 let image = images.image(&name)?;
-                Ok(SeenPixels { stimulus: reduce(&image.pixels)?, label: Some(image.label) })
+                Ok(SeenPixels {
+                    stimulus: reduce(&image.pixels)?,
+                    label: Some(image.label),
+                })
             }
-            ImageChoice { drawing: None, image: None, stimulus: Some(given) } => {
+            ImageChoice {
+                drawing: None,
+                image: None,
+                stimulus: Some(given),
+            } => {
                 if (given.height(), given.width()) != (height, width) {
                     let (rows, columns) = (given.height(), given.width());
                     return Err(HttpRefusal::Wrong(format!(
                         "shown.stimulus: {rows} × {columns} pixels, expected {height} × {width} as the body"
                     )));
                 }
-                if given.cells().iter().any(|pixel| !(0.0..=1.0).contains(pixel)) {
+                if given
+                    .cells()
+                    .iter()
+                    .any(|pixel| !(0.0..=1.0).contains(pixel))
+                {
                     return Err(HttpRefusal::Wrong(
                         "shown.stimulus: expected numbers from 0 to 1".to_string(),
                     ));
                 }
-                Ok(SeenPixels { stimulus: given, label: None })
+                Ok(SeenPixels {
+                    stimulus: given,
+                    label: None,
+                })
             }
-            _ => Err(HttpRefusal::Wrong("shown: expected one of drawing, image, stimulus".to_string())),
+            _ => Err(HttpRefusal::Wrong(
+                "shown: expected one of drawing, image, stimulus".to_string(),
+            )),
         }
     }
 }
@@ -204,13 +252,21 @@ impl SimulationRequest {
         images: &ImageSets,
     ) -> Result<RolloutPlan, HttpRefusal> {
         let mut who = self.subject.find(catalogue)?;
-        let steps = self.control_steps.unwrap_or(who.protocol.control_steps.min(MAX_STEPS));
+        let steps = self
+            .control_steps
+            .unwrap_or(who.protocol.control_steps.min(MAX_STEPS));
         if !(1..=MAX_STEPS).contains(&steps) {
-            return Err(HttpRefusal::Wrong(format!("control_steps: {steps}: expected 1 to {MAX_STEPS}")));
+            return Err(HttpRefusal::Wrong(format!(
+                "control_steps: {steps}: expected 1 to {MAX_STEPS}"
+            )));
         }
         who.protocol.control_steps = steps;
         let seen = self.shown.seen(&who, images)?;
-        Ok(RolloutPlan { who, seen, pace: Pace::of(self.speed.unwrap_or(1.0))? })
+        Ok(RolloutPlan {
+            who,
+            seen,
+            pace: Pace::of(self.speed.unwrap_or(1.0))?,
+        })
     }
 }
 
@@ -234,7 +290,7 @@ impl SeeRequest {
 /// # Errors
 /// Returns an error, with the key, if the request is invalid.
 pub(crate) fn read<T: serde::de::DeserializeOwned>(body: &[u8]) -> Result<T, HttpRefusal> {
-    let text =
-        std::str::from_utf8(body).map_err(|_| HttpRefusal::Wrong("request: not UTF-8 text".to_string()))?;
+    let text = std::str::from_utf8(body)
+        .map_err(|_| HttpRefusal::Wrong("request: not UTF-8 text".to_string()))?;
     crate::config::reading::read_json(text, "request").map_err(HttpRefusal::from)
 }

@@ -30,12 +30,19 @@ pub(crate) fn reply(service: &Service, request: &Request) -> Reply {
     let get = matches!(request.method.as_str(), "GET" | "HEAD");
     let post = request.method == "POST";
     let reading = |answer: &dyn Fn() -> Result<HttpResponse, HttpRefusal>| {
-        let answer =
-            if get { answer().unwrap_or_else(refused) } else { HttpResponse::wrong_method("GET, HEAD") };
+        let answer = if get {
+            answer().unwrap_or_else(refused)
+        } else {
+            HttpResponse::wrong_method("GET, HEAD")
+        };
         Reply::Whole(answer)
     };
     let posting = |answer: &dyn Fn() -> Result<HttpResponse, HttpRefusal>| {
-        let answer = if post { answer().unwrap_or_else(refused) } else { HttpResponse::wrong_method("POST") };
+        let answer = if post {
+            answer().unwrap_or_else(refused)
+        } else {
+            HttpResponse::wrong_method("POST")
+        };
         Reply::Whole(answer)
     };
     match parts.as_slice() {
@@ -43,9 +50,11 @@ pub(crate) fn reply(service: &Service, request: &Request) -> Reply {
         ["api", "materials"] => reading(&|| Ok(HttpResponse::json(&materials()))),
         ["api", "archives"] => reading(&|| Ok(HttpResponse::json(&service.catalogue.list()))),
         ["api", "archives", index] => reading(&|| archive(service, index)),
-        ["api", "archives", index, "progress"] => {
-            reading(&|| Ok(HttpResponse::json(&service.catalogue.course(number(index, "archive")?)?)))
-        }
+        ["api", "archives", index, "progress"] => reading(&|| {
+            Ok(HttpResponse::json(
+                &service.catalogue.course(number(index, "archive")?)?,
+            ))
+        }),
         ["api", "images"] => reading(&|| images(service, request)),
         ["api", "body"] => posting(&|| {
             #[derive(Deserialize)]
@@ -59,16 +68,19 @@ pub(crate) fn reply(service: &Service, request: &Request) -> Reply {
         ["api", "stimulus"] => posting(&|| {
             let asked: SeeRequest = request::read(&request.body)?;
             let seen = asked.seen(&service.catalogue, &service.images)?;
-            Ok(HttpResponse::json(&json!({ "stimulus": seen.stimulus, "label": seen.label })))
+            Ok(HttpResponse::json(
+                &json!({ "stimulus": seen.stimulus, "label": seen.label }),
+            ))
         }),
         ["api", "scenario"] => posting(&|| {
             let text = std::str::from_utf8(&request.body);
-            let text = text.map_err(|_| HttpRefusal::Wrong("scenario: not UTF-8 text".to_string()))?;
+            let text =
+                text.map_err(|_| HttpRefusal::Wrong("scenario: not UTF-8 text".to_string()))?;
             Ok(HttpResponse::json(&service.load(text)?))
         }),
         ["api", "simulations"] if post => {
-            let plan =
-                request::read::<SimulationRequest>(&request.body).and_then(|asked| service.plan(asked));
+            let plan = request::read::<SimulationRequest>(&request.body)
+                .and_then(|asked| service.plan(asked));
             plan.map_or_else(
                 |refusal| Reply::Whole(refused(refusal)),
                 |plan| Reply::Simulation(Box::new(plan)),
@@ -77,19 +89,27 @@ pub(crate) fn reply(service: &Service, request: &Request) -> Reply {
         ["api", "team"] if post => {
             let asked = request::read::<TeamRequest>(&request.body);
             let plan = asked.and_then(|asked| asked.plan(&service.catalogue, &service.images));
-            plan.map_or_else(|refusal| Reply::Whole(refused(refusal)), |plan| Reply::Team(Box::new(plan)))
+            plan.map_or_else(
+                |refusal| Reply::Whole(refused(refusal)),
+                |plan| Reply::Team(Box::new(plan)),
+            )
         }
         ["api", "team"] => reading(&|| {
             let members = team::members(&service.catalogue.collections());
             let classes = team::classes(members.iter().map(|member| &member.judge));
-            Ok(HttpResponse::json(&json!({ "members": members, "classes": classes })))
+            Ok(HttpResponse::json(
+                &json!({ "members": members, "classes": classes }),
+            ))
         }),
         ["api", "simulations"] => Reply::Whole(HttpResponse::wrong_method("POST")),
         ["api", "simulations", id] => posting(&|| change(service, id, &request.body)),
         _ => match asset(&request.path) {
             Some(_) if !get => Reply::Whole(HttpResponse::wrong_method("GET, HEAD")),
             Some(file) => Reply::Whole(file),
-            None => Reply::Whole(HttpResponse::refusal(404, "there is nothing here; the page is at /")),
+            None => Reply::Whole(HttpResponse::refusal(
+                404,
+                "there is nothing here; the page is at /",
+            )),
         },
     }
 }
@@ -105,7 +125,8 @@ pub(crate) fn refused(refusal: HttpRefusal) -> HttpResponse {
 }
 
 fn number<T: std::str::FromStr>(text: &str, what: &str) -> Result<T, HttpRefusal> {
-    text.parse().map_err(|_| HttpRefusal::Wrong(format!("{what}: {text:?}: expected a number")))
+    text.parse()
+        .map_err(|_| HttpRefusal::Wrong(format!("{what}: {text:?}: expected a number")))
 }
 
 fn archive(service: &Service, index: &str) -> Result<HttpResponse, HttpRefusal> {
@@ -124,16 +145,30 @@ fn images(service: &Service, request: &Request) -> Result<HttpResponse, HttpRefu
     let Some(set) = request.asked("set") else {
         return Ok(HttpResponse::json(&service.images.list()));
     };
-    let or = |key: &str, default: usize| request.asked(key).map_or(Ok(default), |text| number(text, key));
-    let class = request.asked("class").map_or(Ok(0), |text| number(text, "class"))?;
-    let page = service.images.page(set, class, or("from", 0)?, or("count", 24)?)?;
+    let or = |key: &str, default: usize| {
+        request
+            .asked(key)
+            .map_or(Ok(default), |text| number(text, key))
+    };
+    let class = request
+        .asked("class")
+        .map_or(Ok(0), |text| number(text, "class"))?;
+    let page = service
+        .images
+        .page(set, class, or("from", 0)?, or("count", 24)?)?;
     Ok(HttpResponse::json(&page))
 }
 
 fn change(service: &Service, id: &str, body: &[u8]) -> Result<HttpResponse, HttpRefusal> {
     let simulation = service.simulations.simulation(number(id, "simulation")?)?;
-    let ChangeRequest { shown, speed, paused } = request::read(body)?;
-    let seen = shown.map(|shown| shown.seen(&simulation.who, &service.images)).transpose()?;
+    let ChangeRequest {
+        shown,
+        speed,
+        paused,
+    } = request::read(body)?;
+    let seen = shown
+        .map(|shown| shown.seen(&simulation.who, &service.images))
+        .transpose()?;
     simulation.change(speed.map(Pace::of).transpose()?, paused, seen);
     Ok(HttpResponse::done())
 }

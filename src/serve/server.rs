@@ -37,13 +37,18 @@ impl Server {
     pub fn bind(service: Service, port: u16) -> Result<Self, Error> {
         let refuse = |error: std::io::Error| match error.kind() {
             std::io::ErrorKind::AddrInUse => {
-                Error::occupied(format!("port {port} is taken by another program")).remedy(Remedy::ChoosePort)
+                Error::occupied(format!("port {port} is taken by another program"))
+                    .remedy(Remedy::ChoosePort)
             }
             _ => Error::other(format!("port {port} of 127.0.0.1 cannot be used: {error}")),
         };
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(refuse)?;
         let address = listener.local_addr().map_err(refuse)?;
-        Ok(Server { listener, address, service: Arc::new(service) })
+        Ok(Server {
+            listener,
+            address,
+            service: Arc::new(service),
+        })
     }
 
     /// Returns the page's URL.
@@ -56,7 +61,11 @@ impl Server {
     /// # Errors
     /// Returns an error if the system has no thread left.
     pub fn run(self, stop: &AtomicBool) -> Result<(), Error> {
-        let Server { listener, address, service } = self;
+        let Server {
+            listener,
+            address,
+            service,
+        } = self;
         let ended = Arc::new(AtomicBool::new(false));
         let (own, over) = (Arc::clone(&service), Arc::clone(&ended));
         threads::start("server", move || accept(&listener, &own, &over))?;
@@ -89,7 +98,9 @@ fn accept(listener: &TcpListener, service: &Arc<Service>, ended: &AtomicBool) {
         if connections.fetch_add(1, Ordering::AcqRel) >= MAX_CONNECTIONS {
             connections.fetch_sub(1, Ordering::AcqRel);
             let busy = HttpResponse::refusal(503, "too many connections at once");
-            let _ = stream.set_write_timeout(Some(LOOK)).and_then(|()| busy.send(&mut stream, false));
+            let _ = stream
+                .set_write_timeout(Some(LOOK))
+                .and_then(|()| busy.send(&mut stream, false));
             continue;
         }
         let place = Place(Arc::clone(&connections));
@@ -118,8 +129,9 @@ fn connection(service: &Service, stream: &mut TcpStream) {
         Ok(Some(request)) => match routes::reply(service, &request) {
             Reply::Whole(response) => (response, request.method == "HEAD"),
             Reply::Simulation(plan) => {
-                let lives =
-                    |slot: &Slot, tell: &mut Tell| live(slot, &plan, |event| tell(&stream::text(&event)));
+                let lives = |slot: &Slot, tell: &mut Tell| {
+                    live(slot, &plan, |event| tell(&stream::text(&event)))
+                };
                 let Some(refusal) = simulation(service, &plan.who, lives, stream) else {
                     return;
                 };
@@ -127,7 +139,9 @@ fn connection(service: &Service, stream: &mut TcpStream) {
             }
             Reply::Team(plan) => {
                 let lives = |slot: &Slot, tell: &mut Tell| {
-                    team::live(slot, &plan, &service.pool, |event| tell(&stream::of_team(&event)))
+                    team::live(slot, &plan, &service.pool, |event| {
+                        tell(&stream::of_team(&event))
+                    })
                 };
                 // A team takes one slot.
                 let Some(refusal) = simulation(service, &plan.members[0].1, lives, stream) else {
@@ -160,8 +174,11 @@ fn simulation(
         return Some(HttpResponse::refusal(503, &error.to_string()));
     }
     let begun = http::begin_events(stream).map_err(|_| Gone);
-    let told = begun
-        .and_then(|()| lives(&slot, &mut |event: &str| stream.write_all(event.as_bytes()).map_err(|_| Gone)));
+    let told = begun.and_then(|()| {
+        lives(&slot, &mut |event: &str| {
+            stream.write_all(event.as_bytes()).map_err(|_| Gone)
+        })
+    });
     // Stops the thread that watches the connection.
     slot.control.end();
     drop(slot);
@@ -177,7 +194,8 @@ fn simulation(
 /// # Errors
 /// Returns an error if the system has no file or no thread left.
 fn end_with(stream: &TcpStream, control: &Arc<Control>) -> Result<(), Error> {
-    let failed = |error: io::Error| Error::other(format!("the connection cannot be watched: {error}"));
+    let failed =
+        |error: io::Error| Error::other(format!("the connection cannot be watched: {error}"));
     let (stream, control) = (stream.try_clone().map_err(failed)?, Arc::clone(control));
     stream.set_read_timeout(Some(LOOK)).map_err(failed)?;
     let watch = move || {
@@ -185,7 +203,8 @@ fn end_with(stream: &TcpStream, control: &Arc<Control>) -> Result<(), Error> {
             match stream.peek(&mut [0]) {
                 // The client keeps sending.
                 Ok(count) if count > 0 => std::thread::sleep(LOOK),
-                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+                Err(error)
+                    if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Ok(_) | Err(_) => control.end(),
             }

@@ -84,7 +84,12 @@ pub(crate) fn live(
     let system = Arc::new(System::new(&who.body, who.physics.clone()));
     let mut rollout = Rollout::new(&system, &who.protocol);
     rollout.look_at(&plan.seen.stimulus);
-    tell(Event::Begin { id: slot.id, plan, voxels: rollout.voxels(), frame: rollout.frame() })?;
+    tell(Event::Begin {
+        id: slot.id,
+        plan,
+        voxels: rollout.voxels(),
+        frame: rollout.frame(),
+    })?;
     let shown_for = who.protocol.control_steps;
     let (mut step, mut until) = (0, shown_for);
     let mut clock = Clock::new(plan.pace);
@@ -98,7 +103,11 @@ pub(crate) fn live(
         }
         clock.set(news.pace, news.paused);
         if news.end || step >= until {
-            return tell(Event::End { step, answer: answer(judge, rollout.moved()), unstable: None });
+            return tell(Event::End {
+                step,
+                answer: answer(judge, rollout.moved()),
+                unstable: None,
+            });
         }
         let due = match clock.due(step) {
             Some(due) => due.min(until - step),
@@ -115,14 +124,26 @@ pub(crate) fn live(
             match rollout.step_unless(&slot.control.over) {
                 Ok(()) => {}
                 Err(StepError::Stopped(_)) => {
-                    return tell(Event::End { step, answer: answer(judge, before), unstable: None });
+                    return tell(Event::End {
+                        step,
+                        answer: answer(judge, before),
+                        unstable: None,
+                    });
                 }
                 Err(StepError::Unstable(unstable)) => {
                     let answer = answer(judge, before);
                     if !frames.is_empty() {
-                        tell(Event::Moments { step, frames: &frames, answer: answer.clone() })?;
+                        tell(Event::Moments {
+                            step,
+                            frames: &frames,
+                            answer: answer.clone(),
+                        })?;
                     }
-                    return tell(Event::End { step, answer, unstable: Some(unstable.to_string()) });
+                    return tell(Event::End {
+                        step,
+                        answer,
+                        unstable: Some(unstable.to_string()),
+                    });
                 }
             }
             step += 1;
@@ -133,7 +154,11 @@ pub(crate) fn live(
             }
         }
         if !frames.is_empty() {
-            tell(Event::Moments { step, frames: &frames, answer: answer(judge, rollout.moved()) })?;
+            tell(Event::Moments {
+                step,
+                frames: &frames,
+                answer: answer(judge, rollout.moved()),
+            })?;
         }
         clock.sleep(&slot.control);
     }
@@ -149,7 +174,11 @@ pub(super) struct Clock {
 
 impl Clock {
     pub(super) fn new(pace: Pace) -> Self {
-        Clock { pace, paused: false, begin: None }
+        Clock {
+            pace,
+            paused: false,
+            begin: None,
+        }
     }
 
     pub(super) fn set(&mut self, pace: Option<Pace>, paused: Option<bool>) {
@@ -201,13 +230,23 @@ mod tests {
         let who = Who {
             body: "3434/4343".parse().unwrap(),
             // A control step takes a quarter of an hour.
-            physics: Physics { substeps: u32::MAX, ..Physics::default() },
+            physics: Physics {
+                substeps: u32::MAX,
+                ..Physics::default()
+            },
             protocol: Protocol::default(),
             encoding: StimulusParams::default(),
             judge: None,
         };
-        let seen = SeenPixels { stimulus: Grid::filled(2, 4, 0.0), label: None };
-        let plan = RolloutPlan { who: who.clone(), seen, pace: Pace::Free };
+        let seen = SeenPixels {
+            stimulus: Grid::filled(2, 4, 0.0),
+            label: None,
+        };
+        let plan = RolloutPlan {
+            who: who.clone(),
+            seen,
+            pace: Pace::Free,
+        };
         let simulations = Simulations::default();
         let slot = simulations.begin(who).unwrap();
         let begin = Instant::now();

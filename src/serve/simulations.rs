@@ -45,7 +45,12 @@ pub(crate) struct News {
 
 impl Control {
     /// Requests a change.
-    pub(crate) fn change(&self, pace: Option<Pace>, paused: Option<bool>, seen: Option<SeenPixels>) {
+    pub(crate) fn change(
+        &self,
+        pace: Option<Pace>,
+        paused: Option<bool>,
+        seen: Option<SeenPixels>,
+    ) {
         let mut wishes = lock(&self.wishes);
         wishes.pace = pace.or(wishes.pace);
         wishes.paused = paused.or(wishes.paused);
@@ -82,9 +87,15 @@ impl Control {
     /// Waits for up to `time`, or until a change is requested.
     pub(crate) fn wait(&self, time: Duration) {
         let idle = |wishes: &mut Wishes| {
-            wishes.pace.is_none() && wishes.paused.is_none() && wishes.seen.is_none() && !self.is_over()
+            wishes.pace.is_none()
+                && wishes.paused.is_none()
+                && wishes.seen.is_none()
+                && !self.is_over()
         };
-        drop(self.changed.wait_timeout_while(lock(&self.wishes), time, idle));
+        drop(
+            self.changed
+                .wait_timeout_while(lock(&self.wishes), time, idle),
+        );
     }
 }
 
@@ -118,8 +129,9 @@ impl Simulations {
     pub(crate) fn begin(&self, who: Who) -> Result<Slot<'_>, HttpRefusal> {
         let mut running = lock(&self.running);
         if running.closed || running.simulations.len() >= MAX_SIMULATIONS {
-            let text =
-                format!("{MAX_SIMULATIONS} simulations are running, the most at once; close a tab or wait");
+            let text = format!(
+                "{MAX_SIMULATIONS} simulations are running, the most at once; close a tab or wait"
+            );
             return Err(HttpRefusal::Busy(text));
         }
         running.begun += 1;
@@ -131,7 +143,11 @@ impl Simulations {
             over: AtomicBool::new(false),
         });
         running.simulations.insert(id, Arc::clone(&control));
-        Ok(Slot { simulations: self, id, control })
+        Ok(Slot {
+            simulations: self,
+            id,
+            control,
+        })
     }
 
     /// Returns the control of a running simulation.
@@ -140,8 +156,9 @@ impl Simulations {
     /// Returns an error if no simulation has that number (any more).
     pub(crate) fn simulation(&self, id: u64) -> Result<Arc<Control>, HttpRefusal> {
         let found = lock(&self.running).simulations.get(&id).cloned();
-        found
-            .ok_or_else(|| HttpRefusal::Unknown(format!("there is no simulation {id}; perhaps it has ended")))
+        found.ok_or_else(|| {
+            HttpRefusal::Unknown(format!("there is no simulation {id}; perhaps it has ended"))
+        })
     }
 
     /// Returns the number of running simulations.
@@ -158,7 +175,10 @@ impl Simulations {
     pub(crate) fn close(&self) {
         let mut running = lock(&self.running);
         running.closed = true;
-        running.simulations.values().for_each(|control| control.end());
+        running
+            .simulations
+            .values()
+            .for_each(|control| control.end());
     }
 }
 

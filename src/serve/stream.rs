@@ -17,16 +17,31 @@ use serde_json::{Value, json};
 /// Encodes an event.
 pub(crate) fn text(event: &Event) -> String {
     let (name, data) = match event {
-        Event::Begin { id, plan, voxels, frame } => ("begin", begin(*id, plan, voxels, frame)),
+        Event::Begin {
+            id,
+            plan,
+            voxels,
+            frame,
+        } => ("begin", begin(*id, plan, voxels, frame)),
         Event::Seen { step, until, seen } => ("seen", looks(*step, *until, seen)),
-        Event::Moments { step, frames, answer } => {
-            ("moments", json!({ "step": step, "frames": positions(frames), "answer": answer }))
-        }
+        Event::Moments {
+            step,
+            frames,
+            answer,
+        } => (
+            "moments",
+            json!({ "step": step, "frames": positions(frames), "answer": answer }),
+        ),
         // A comment: the page has nothing to do.
         Event::Still => return ":\n\n".to_string(),
-        Event::End { step, answer, unstable } => {
-            ("end", json!({ "step": step, "answer": answer, "unstable": unstable }))
-        }
+        Event::End {
+            step,
+            answer,
+            unstable,
+        } => (
+            "end",
+            json!({ "step": step, "answer": answer, "unstable": unstable }),
+        ),
     };
     format!("event: {name}\ndata: {data}\n\n")
 }
@@ -34,7 +49,12 @@ pub(crate) fn text(event: &Event) -> String {
 /// Encodes a team's event.
 pub(crate) fn of_team(event: &TeamEvent) -> String {
     let (name, data) = match event {
-        TeamEvent::Begin { id, plan, classes, stands } => {
+        TeamEvent::Begin {
+            id,
+            plan,
+            classes,
+            stands,
+        } => {
             let member = |((name, who, _), (voxels, frame)): (
                 &(Name, Who, SeenPixels),
                 &(Vec<VoxelCorners>, Frame),
@@ -55,11 +75,21 @@ pub(crate) fn of_team(event: &TeamEvent) -> String {
             });
             ("begin", words)
         }
-        TeamEvent::Moment { step, frames, tally } => {
-            let frame =
-                |frame: &Option<Frame>| frame.as_ref().map(|frame| positions(std::slice::from_ref(frame)));
+        TeamEvent::Moment {
+            step,
+            frames,
+            tally,
+        } => {
+            let frame = |frame: &Option<Frame>| {
+                frame
+                    .as_ref()
+                    .map(|frame| positions(std::slice::from_ref(frame)))
+            };
             let frames: Vec<Option<String>> = frames.iter().map(frame).collect();
-            ("moment", json!({ "step": step, "frames": frames, "tally": tally }))
+            (
+                "moment",
+                json!({ "step": step, "frames": frames, "tally": tally }),
+            )
         }
         TeamEvent::Still => return ":\n\n".to_string(),
         TeamEvent::End { step, tally } => ("end", json!({ "step": step, "tally": tally })),
@@ -93,8 +123,13 @@ fn positions(frames: &[Frame]) -> String {
     let mut bytes = Vec::new();
     for frame in frames {
         let origin = frame.centre.map(|v| (v * STEPS).round() / STEPS);
-        origin.iter().for_each(|v| bytes.extend_from_slice(&v.to_le_bytes()));
-        let numbers = frame.points.iter().flat_map(|point| quantised(*point, origin));
+        origin
+            .iter()
+            .for_each(|v| bytes.extend_from_slice(&v.to_le_bytes()));
+        let numbers = frame
+            .points
+            .iter()
+            .flat_map(|point| quantised(*point, origin));
         numbers.for_each(|number| bytes.extend_from_slice(&number.to_le_bytes()));
     }
     BASE64.encode(bytes)

@@ -38,43 +38,69 @@ pub(crate) struct Name {
 /// the dataset with the most tasks. If there are fewer than two, returns the shipped team.
 pub(crate) fn members(collections: &[Arc<Collection>]) -> Vec<Name> {
     type Numbered<'a> = Vec<(usize, &'a Arc<Collection>)>;
-    let (built_in, archives): (Numbered, Numbered) =
-        collections.iter().enumerate().partition(|(_, from)| from.path.is_none());
+    let (built_in, archives): (Numbered, Numbered) = collections
+        .iter()
+        .enumerate()
+        .partition(|(_, from)| from.path.is_none());
     let own = largest(archives);
     match own.len() < LEAST {
-        true => largest(built_in.into_iter().max_by_key(|(_, from)| from.tasks.len())),
+        true => largest(
+            built_in
+                .into_iter()
+                .max_by_key(|(_, from)| from.tasks.len()),
+        ),
         false => own,
     }
 }
 
 /// Returns the largest team among collections, each with its number.
 fn largest<'a>(collections: impl IntoIterator<Item = (usize, &'a Arc<Collection>)>) -> Vec<Name> {
-    let data = |from: &Collection| (from.config.data.dataset.clone(), from.config.data.builtin.clone());
+    let data = |from: &Collection| {
+        (
+            from.config.data.dataset.clone(),
+            from.config.data.builtin.clone(),
+        )
+    };
     let mut teams: Vec<(_, Vec<Name>)> = Vec::new();
     for (archive, from) in collections {
         let of = data(from);
-        let place = teams.iter().position(|(other, _)| *other == of).unwrap_or_else(|| {
-            teams.push((of, Vec::new()));
-            teams.len() - 1
-        });
+        let place = teams
+            .iter()
+            .position(|(other, _)| *other == of)
+            .unwrap_or_else(|| {
+                teams.push((of, Vec::new()));
+                teams.len() - 1
+            });
         let members = &mut teams[place].1;
         for robot in &from.robots {
             let Some(judge) = &robot.judge else { continue };
             if members.iter().all(|member| member.task != robot.task) {
                 let (id, task) = (robot.id.clone(), robot.task.clone());
-                members.push(Name { archive, robot: id, task, judge: judge.clone() });
+                members.push(Name {
+                    archive,
+                    robot: id,
+                    task,
+                    judge: judge.clone(),
+                });
             }
         }
     }
-    let mut members = teams.into_iter().map(|(_, members)| members).max_by_key(Vec::len).unwrap_or_default();
+    let mut members = teams
+        .into_iter()
+        .map(|(_, members)| members)
+        .max_by_key(Vec::len)
+        .unwrap_or_default();
     members.sort_by(|a, b| a.task.cmp(&b.task));
     members
 }
 
 /// Returns the classes that a team tells apart, in order.
 pub(crate) fn classes<'a>(judges: impl IntoIterator<Item = &'a Readout>) -> Vec<u8> {
-    let all: BTreeSet<u8> =
-        judges.into_iter().flat_map(|judge| judge.left.iter().chain(&judge.right)).copied().collect();
+    let all: BTreeSet<u8> = judges
+        .into_iter()
+        .flat_map(|judge| judge.left.iter().chain(&judge.right))
+        .copied()
+        .collect();
     all.into_iter().collect()
 }
 
@@ -125,14 +151,27 @@ impl TeamRequest {
         let (_, first, _) = members.first().expect("a team ships with the program");
         let stimuli = members.iter().map(|(_, who, _)| who.encoding);
         let encoding = StimulusParams::together(stimuli).expect("the first member's is among them");
-        let together = self.shown.seen(&Who { encoding, ..first.clone() }, images)?;
-        let control_steps = self.control_steps.unwrap_or(first.protocol.control_steps.min(MAX_STEPS));
+        let together = self.shown.seen(
+            &Who {
+                encoding,
+                ..first.clone()
+            },
+            images,
+        )?;
+        let control_steps = self
+            .control_steps
+            .unwrap_or(first.protocol.control_steps.min(MAX_STEPS));
         if !(1..=MAX_STEPS).contains(&control_steps) {
             return Err(HttpRefusal::Wrong(format!(
                 "control_steps: {control_steps}: expected 1 to {MAX_STEPS}"
             )));
         }
-        Ok(TeamPlan { members, together, control_steps, pace: Pace::of(self.speed.unwrap_or(1.0))? })
+        Ok(TeamPlan {
+            members,
+            together,
+            control_steps,
+            pace: Pace::of(self.speed.unwrap_or(1.0))?,
+        })
     }
 }
 
@@ -193,19 +232,37 @@ pub(crate) fn live(
     for ((_, who, seen), system) in plan.members.iter().zip(&systems) {
         let mut rollout = Rollout::new(system, &who.protocol);
         rollout.look_at(&seen.stimulus);
-        walkers.push(Walker { rollout, is_unstable: false });
+        walkers.push(Walker {
+            rollout,
+            is_unstable: false,
+        });
     }
-    let judges: Vec<&Readout> = plan.members.iter().map(|(name, _, _)| &name.judge).collect();
+    let judges: Vec<&Readout> = plan
+        .members
+        .iter()
+        .map(|(name, _, _)| &name.judge)
+        .collect();
     let classes = classes(judges.iter().copied());
-    let stands = walkers.iter().map(|walker| (walker.rollout.voxels(), walker.rollout.frame())).collect();
-    tell(TeamEvent::Begin { id: slot.id, plan, classes: &classes, stands })?;
+    let stands = walkers
+        .iter()
+        .map(|walker| (walker.rollout.voxels(), walker.rollout.frame()))
+        .collect();
+    tell(TeamEvent::Begin {
+        id: slot.id,
+        plan,
+        classes: &classes,
+        stands,
+    })?;
     let mut clock = Clock::new(plan.pace);
     let mut step = 0;
     loop {
         let news = slot.control.news();
         clock.set(news.pace, news.paused);
         if news.end || step >= plan.control_steps {
-            return tell(TeamEvent::End { step, tally: tally(&walkers, &judges, &classes) });
+            return tell(TeamEvent::End {
+                step,
+                tally: tally(&walkers, &judges, &classes),
+            });
         }
         let Some(due) = clock.due(step) else {
             tell(TeamEvent::Still)?;
@@ -226,7 +283,10 @@ pub(crate) fn live(
                 }
             };
             pool.install(|| {
-                walkers.par_iter_mut().filter(|walker| !walker.is_unstable).for_each(walks);
+                walkers
+                    .par_iter_mut()
+                    .filter(|walker| !walker.is_unstable)
+                    .for_each(walks);
             });
             if slot.control.is_over() {
                 continue;
@@ -234,7 +294,11 @@ pub(crate) fn live(
             step += due;
             let frame = |walker: &Walker| (!walker.is_unstable).then(|| walker.rollout.frame());
             let frames = walkers.iter().map(frame).collect();
-            tell(TeamEvent::Moment { step, frames, tally: tally(&walkers, &judges, &classes) })?;
+            tell(TeamEvent::Moment {
+                step,
+                frames,
+                tally: tally(&walkers, &judges, &classes),
+            })?;
         }
         clock.sleep(&slot.control);
     }
@@ -242,7 +306,10 @@ pub(crate) fn live(
 
 /// Counts the votes so far.
 fn tally(walkers: &[Walker], judges: &[&Readout], classes: &[u8]) -> Tally {
-    let moved = walkers.iter().map(|walker| (!walker.is_unstable).then(|| walker.rollout.moved())).collect();
+    let moved = walkers
+        .iter()
+        .map(|walker| (!walker.is_unstable).then(|| walker.rollout.moved()))
+        .collect();
     Tally::of(classes, judges, moved, (THRESHOLD, CLIP))
 }
 
@@ -259,12 +326,18 @@ mod tests {
     use std::sync::atomic::AtomicBool;
 
     fn plan() -> TeamPlan {
-        let judge = |a, b| Readout { left: vec![a], right: vec![b] };
+        let judge = |a, b| Readout {
+            left: vec![a],
+            right: vec![b],
+        };
         let member = |body: &str, judge: Readout| {
             let who = Who {
                 body: body.parse().unwrap(),
                 physics: Physics::default(),
-                protocol: Protocol { control_steps: 120, ..Protocol::default() },
+                protocol: Protocol {
+                    control_steps: 120,
+                    ..Protocol::default()
+                },
                 encoding: StimulusParams::default(),
                 judge: Some(judge.clone()),
             };
@@ -272,11 +345,28 @@ mod tests {
                 stimulus: Grid::filled(who.body.height(), who.body.width(), 1.0),
                 label: Some(1),
             };
-            (Name { archive: 0, robot: body.to_string(), task: String::new(), judge }, who, seen)
+            (
+                Name {
+                    archive: 0,
+                    robot: body.to_string(),
+                    task: String::new(),
+                    judge,
+                },
+                who,
+                seen,
+            )
         };
-        let members = vec![member("3434/4345/6363", judge(0, 1)), member("334/463/343", judge(1, 2))];
+        let members = vec![
+            member("3434/4345/6363", judge(0, 1)),
+            member("334/463/343", judge(1, 2)),
+        ];
         let together = members[0].2.clone();
-        TeamPlan { members, together, control_steps: 120, pace: Pace::Free }
+        TeamPlan {
+            members,
+            together,
+            control_steps: 120,
+            pace: Pace::Free,
+        }
     }
 
     #[test]
@@ -287,7 +377,9 @@ mod tests {
         let (mut moments, mut end) = (0, None);
         live(&slot, &plan, &pool(None).unwrap(), |event| {
             match event {
-                TeamEvent::Begin { classes, stands, .. } => {
+                TeamEvent::Begin {
+                    classes, stands, ..
+                } => {
                     assert_eq!((classes, stands.len()), (&[0, 1, 2][..], 2))
                 }
                 TeamEvent::Moment { frames, .. } => {
@@ -303,12 +395,21 @@ mod tests {
         assert!((step, moments > 3) == (120, true));
         let alone = |(_, who, seen): &(Name, Who, SeenPixels)| {
             let system = Arc::new(System::new(&who.body, who.physics.clone()));
-            fresh_rollout(&system, &who.protocol, &seen.stimulus, &AtomicBool::new(false)).ok()
+            fresh_rollout(
+                &system,
+                &who.protocol,
+                &seen.stimulus,
+                &AtomicBool::new(false),
+            )
+            .ok()
         };
         let walks: Vec<Option<f64>> = plan.members.iter().map(alone).collect();
         assert_eq!(tally.moved, walks);
         let judges = plan.members.iter().map(|(name, _, _)| &name.judge);
-        assert_eq!(tally.ballot, Ballot::count(&[0, 1, 2], judges.zip(walks), THRESHOLD, CLIP));
+        assert_eq!(
+            tally.ballot,
+            Ballot::count(&[0, 1, 2], judges.zip(walks), THRESHOLD, CLIP)
+        );
     }
 
     #[test]

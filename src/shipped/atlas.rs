@@ -19,7 +19,9 @@ const COMPRESSED: &str = ".gz";
 
 /// Returns the folders to search, in order; `variable` is the value of `MORPHCOG_ATLAS`.
 fn folders(variable: Option<&OsStr>) -> Vec<PathBuf> {
-    let set = variable.filter(|value| !value.is_empty()).map(PathBuf::from);
+    let set = variable
+        .filter(|value| !value.is_empty())
+        .map(PathBuf::from);
     set.into_iter().chain([PathBuf::from(FOLDER)]).collect()
 }
 
@@ -29,7 +31,9 @@ fn variable() -> Option<std::ffi::OsString> {
 
 /// Returns the folder of the atlas that has a run.
 pub(crate) fn folder_of(run: &str) -> Option<PathBuf> {
-    folders(variable().as_deref()).into_iter().find(|folder| holds_run(&folder.join(run)))
+    folders(variable().as_deref())
+        .into_iter()
+        .find(|folder| holds_run(&folder.join(run)))
 }
 
 /// Returns the path of a run's compressed file.
@@ -41,22 +45,40 @@ pub(crate) fn file(run: &str, file: &str) -> io::Result<PathBuf> {
 }
 
 fn found(run: &str, file: &str, variable: Option<&OsStr>) -> io::Result<PathBuf> {
-    if let Some(set) = variable.filter(|value| !value.is_empty()).filter(|value| !Path::new(value).is_dir()) {
+    if let Some(set) = variable
+        .filter(|value| !value.is_empty())
+        .filter(|value| !Path::new(value).is_dir())
+    {
         let text = format!("{VARIABLE}={}: expected a folder", Path::new(set).display());
         return Err(io::Error::new(io::ErrorKind::NotADirectory, text));
     }
     let folders = folders(variable);
-    let places = folders.iter().map(|folder| folder.join(run).join(format!("{file}{COMPRESSED}")));
+    let places = folders
+        .iter()
+        .map(|folder| folder.join(run).join(format!("{file}{COMPRESSED}")));
     let places: Vec<PathBuf> = places.collect();
     if let Some(place) = places.iter().find(|place| place.is_file()) {
         return Ok(place.clone());
     }
-    let looked: Vec<String> = places.iter().map(|place| place.display().to_string()).collect();
-    let unset = if folders.len() == 1 { format!(" ({VARIABLE} is not set)") } else { String::new() };
-    let what = match folders.iter().map(|folder| names(folder)).find(|names| !names.is_empty()) {
+    let looked: Vec<String> = places
+        .iter()
+        .map(|place| place.display().to_string())
+        .collect();
+    let unset = if folders.len() == 1 {
+        format!(" ({VARIABLE} is not set)")
+    } else {
+        String::new()
+    };
+    let what = match folders
+        .iter()
+        .map(|folder| names(folder))
+        .find(|names| !names.is_empty())
+    {
         Some(names) => format!("expected one of {}", names.join(", ")),
         None => {
-            format!("the atlas is in the repository: call morphcog there, or set {VARIABLE} to its {FOLDER}")
+            format!(
+                "the atlas is in the repository: call morphcog there, or set {VARIABLE} to its {FOLDER}"
+            )
         }
     };
     Err(io::Error::new(
@@ -69,8 +91,16 @@ fn found(run: &str, file: &str, variable: Option<&OsStr>) -> io::Result<PathBuf>
 fn names(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let of_runs = entries.filter(|entry| holds_run(&entry.path()));
-    let mut names: Vec<String> = of_runs.filter_map(|entry| entry.file_name().into_string().ok()).collect();
-    names.sort_by_key(|name| (name.trim_end_matches(|c: char| c.is_ascii_digit()).to_string(), seed(name)));
+    let mut names: Vec<String> = of_runs
+        .filter_map(|entry| entry.file_name().into_string().ok())
+        .collect();
+    names.sort_by_key(|name| {
+        (
+            name.trim_end_matches(|c: char| c.is_ascii_digit())
+                .to_string(),
+            seed(name),
+        )
+    });
     names
 }
 
@@ -98,8 +128,11 @@ fn seeds(name: &str, variable: Option<&OsStr>) -> Vec<PathBuf> {
         let is_of_set = |found: &String| {
             found.rsplit_once('-').is_some_and(|(set, _)| set == name) && seed(found).is_some()
         };
-        let of_set: Vec<PathBuf> =
-            names(&folder).into_iter().filter(is_of_set).map(|name| run_json(&name)).collect();
+        let of_set: Vec<PathBuf> = names(&folder)
+            .into_iter()
+            .filter(is_of_set)
+            .map(|name| run_json(&name))
+            .collect();
         if !of_set.is_empty() {
             return of_set;
         }
@@ -121,13 +154,18 @@ mod tests {
         let variable = Some(folder.path().as_os_str());
         let place = found("zero_one-2", "run.json", variable).unwrap();
         assert_eq!(place, folder.path().join("zero_one-2").join("run.json.gz"));
-        let error = found("zero_one-30", "run.json", variable).unwrap_err().to_string();
+        let error = found("zero_one-30", "run.json", variable)
+            .unwrap_err()
+            .to_string();
         let said = format!(
             "there is no {} and no data/atlas/zero_one-30/run.json.gz; expected one of zero_one",
             folder.path().join("zero_one-30/run.json.gz").display()
         );
         assert!(error.starts_with(&said), "{error}");
-        assert_eq!(seeds("zero_one", variable), [Path::new("atlas:zero_one/run.json")]);
+        assert_eq!(
+            seeds("zero_one", variable),
+            [Path::new("atlas:zero_one/run.json")]
+        );
         // A folder of that name may hold results about all seeds.
         std::fs::rename(
             folder.path().join("zero_one/run.json.gz"),
@@ -142,13 +180,21 @@ mod tests {
     fn without_an_atlas_the_error_says_how_to_get_it() {
         let folder = tempfile::tempdir().unwrap();
         let nowhere = folder.path().join("nowhere");
-        let error = |folder: &Path| found("x", "run.json", Some(folder.as_os_str())).unwrap_err().to_string();
+        let error = |folder: &Path| {
+            found("x", "run.json", Some(folder.as_os_str()))
+                .unwrap_err()
+                .to_string()
+        };
         assert!(
-            error(&nowhere).starts_with("MORPHCOG_ATLAS=") && error(&nowhere).contains("expected a folder")
+            error(&nowhere).starts_with("MORPHCOG_ATLAS=")
+                && error(&nowhere).contains("expected a folder")
         );
         std::fs::create_dir(&nowhere).unwrap();
         let error = error(&nowhere);
-        assert!(error.contains("nowhere/x/run.json.gz and no data/atlas/x/run.json.gz"), "{error}");
+        assert!(
+            error.contains("nowhere/x/run.json.gz and no data/atlas/x/run.json.gz"),
+            "{error}"
+        );
         let error = found("x-7", "run.json", None).unwrap_err().to_string();
         assert!(error.contains("MORPHCOG_ATLAS is not set"), "{error}");
     }

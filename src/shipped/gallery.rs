@@ -34,9 +34,18 @@ macro_rules! run {
         (
             $name,
             &[
-                ("run.json", include_str!(concat!("../../data/", $folder, "/run.json"))),
-                ("audit.json", include_str!(concat!("../../data/", $folder, "/audit.json"))),
-                ("validation.json", include_str!(concat!("../../data/", $folder, "/validation.json"))),
+                (
+                    "run.json",
+                    include_str!(concat!("../../data/", $folder, "/run.json")),
+                ),
+                (
+                    "audit.json",
+                    include_str!(concat!("../../data/", $folder, "/audit.json")),
+                ),
+                (
+                    "validation.json",
+                    include_str!(concat!("../../data/", $folder, "/validation.json")),
+                ),
             ],
         )
     };
@@ -83,7 +92,10 @@ const SETS: &[Set] = &[
             "gallery:gaits-6",
             &[
                 ("run.json", include_str!("../../data/gaits/seed-6/run.json")),
-                ("response.json", include_str!("../../data/gaits/seed-6/response.json")),
+                (
+                    "response.json",
+                    include_str!("../../data/gaits/seed-6/response.json"),
+                ),
             ],
         )],
     ),
@@ -91,8 +103,14 @@ const SETS: &[Set] = &[
 
 /// Returns the text of a file of a run; none if there is no such run or file.
 pub(crate) fn text(name: &str, file: &str) -> Option<&'static str> {
-    let (_, files) = SETS.iter().flat_map(|(_, runs)| *runs).find(|(run, _)| *run == name)?;
-    files.iter().find(|(own, _)| *own == file).map(|(_, text)| *text)
+    let (_, files) = SETS
+        .iter()
+        .flat_map(|(_, runs)| *runs)
+        .find(|(run, _)| *run == name)?;
+    files
+        .iter()
+        .find(|(own, _)| *own == file)
+        .map(|(_, text)| *text)
 }
 
 /// Returns the `run.json` of every run of a set, or of one run.
@@ -114,15 +132,27 @@ fn runs_of(sets: &[Set], name: &str) -> Result<Vec<PathBuf>, String> {
     }
     let of_set = |(set, runs): &Set| {
         let is_whole = *set == name || name == ALL && *set != GAITS;
-        runs.iter().map(|(run, _)| *run).filter(|run| is_whole || *run == name).collect::<Vec<&str>>()
+        runs.iter()
+            .map(|(run, _)| *run)
+            .filter(|run| is_whole || *run == name)
+            .collect::<Vec<&str>>()
     };
-    let found: Vec<PathBuf> =
-        sets.iter().flat_map(of_set).map(|run| PathBuf::from(format!("{run}/run.json"))).collect();
+    let found: Vec<PathBuf> = sets
+        .iter()
+        .flat_map(of_set)
+        .map(|run| PathBuf::from(format!("{run}/run.json")))
+        .collect();
     match found.is_empty() {
         true => {
             // Each set is listed with one of its runs as an example.
-            let names: Vec<String> = sets.iter().map(|(set, runs)| format!("{set}, {}", runs[0].0)).collect();
-            Err(format!("there is no {name}: expected {ALL}, {}", names.join(", ")))
+            let names: Vec<String> = sets
+                .iter()
+                .map(|(set, runs)| format!("{set}, {}", runs[0].0))
+                .collect();
+            Err(format!(
+                "there is no {name}: expected {ALL}, {}",
+                names.join(", ")
+            ))
         }
         false => Ok(found),
     }
@@ -136,17 +166,25 @@ mod tests {
     fn names_lead_to_runs_and_their_files() {
         let all = runs("gallery:all").unwrap();
         let set = runs("gallery:zero_one").unwrap();
-        let [one] = &runs("gallery:zero_one-1").unwrap()[..] else { panic!("one run") };
+        let [one] = &runs("gallery:zero_one-1").unwrap()[..] else {
+            panic!("one run")
+        };
         assert!(all.len() >= set.len() && set.len() > 1 && set[0] == *one);
         for path in &all {
             let (name, file) = path.to_str().unwrap().split_once('/').unwrap();
-            assert!(text(name, file).unwrap().contains("morphcog-run"), "{}", path.display());
+            assert!(
+                text(name, file).unwrap().contains("morphcog-run"),
+                "{}",
+                path.display()
+            );
             assert!(text(name, "audit.json").unwrap().contains("morphcog-audit"));
             assert_eq!(text(name, "nothing.json"), None);
         }
         let error = runs("gallery:zero").unwrap_err();
         assert!(
-            error.contains("gallery:zero_one-1, gallery:four_digit, gallery:four_digit-0v123, gallery:team"),
+            error.contains(
+                "gallery:zero_one-1, gallery:four_digit, gallery:four_digit-0v123, gallery:team"
+            ),
             "{error}"
         );
         assert_eq!(runs(TEAM).unwrap().len(), 45);
@@ -155,6 +193,9 @@ mod tests {
     #[test]
     fn a_build_without_runs_says_so() {
         let error = runs_of(&[], "gallery:zero_one").unwrap_err();
-        assert!(error.starts_with("gallery:zero_one") && error.contains("feature `gallery`"), "{error}");
+        assert!(
+            error.starts_with("gallery:zero_one") && error.contains("feature `gallery`"),
+            "{error}"
+        );
     }
 }

@@ -22,7 +22,10 @@ enum Place {
 fn parts(path: &Path) -> Option<(&str, &str)> {
     let text = path.to_str()?;
     let (name, file) = text.split_once(['/', '\\']).unwrap_or((text, ""));
-    [gallery::PREFIX, atlas::PREFIX].iter().any(|prefix| name.starts_with(prefix)).then_some((name, file))
+    [gallery::PREFIX, atlas::PREFIX]
+        .iter()
+        .any(|prefix| name.starts_with(prefix))
+        .then_some((name, file))
 }
 
 /// Returns true if a path names a run, or a file of one.
@@ -79,7 +82,8 @@ pub(crate) fn exists(path: &Path) -> bool {
 /// Returns an error that lists the shipped runs if none of them has that name.
 pub(crate) fn runs(path: &Path) -> Result<Vec<PathBuf>, String> {
     let (name, _) = parts(path).expect("callers ask is_named before");
-    name.strip_prefix(atlas::PREFIX).map_or_else(|| gallery::runs(name), |run| Ok(atlas::runs(run)))
+    name.strip_prefix(atlas::PREFIX)
+        .map_or_else(|| gallery::runs(name), |run| Ok(atlas::runs(run)))
 }
 
 #[cfg(test)]
@@ -89,10 +93,16 @@ mod tests {
     #[test]
     fn a_path_of_a_named_run_has_its_name() {
         let named = |path| name(Path::new(path));
-        assert_eq!(named("gallery:zero_one-1/run.json"), Some(("gallery", "zero_one-1")));
+        assert_eq!(
+            named("gallery:zero_one-1/run.json"),
+            Some(("gallery", "zero_one-1"))
+        );
         assert_eq!(named("atlas:four_digit-2"), Some(("atlas", "four_digit-2")));
         assert_eq!(named("runs/atlas:four_digit-2"), None);
-        assert_eq!(set(Path::new("gallery:zero_one-1/run.json")), Some(("gallery", "zero_one")));
+        assert_eq!(
+            set(Path::new("gallery:zero_one-1/run.json")),
+            Some(("gallery", "zero_one"))
+        );
         assert_eq!(set(Path::new("runs/atlas:four_digit-2")), None);
     }
 }

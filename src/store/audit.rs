@@ -95,17 +95,32 @@ impl Stored for AuditFile {
         self.criteria.check()?;
         for (number, robot) in self.robots.iter().enumerate() {
             let at = |key: &str| format!("robots[{number}].{key}");
-            if self.robots[..number].iter().any(|other| other.id == robot.id) {
-                return Err(Error::at_key(&at("id"), format!("{} is there twice", robot.id)));
+            if self.robots[..number]
+                .iter()
+                .any(|other| other.id == robot.id)
+            {
+                return Err(Error::at_key(
+                    &at("id"),
+                    format!("{} is there twice", robot.id),
+                ));
             }
             let Energy { drive, limits } = robot.energy_per_cycle;
             ranges::check(&at("energy_per_cycle.drive"), drive)?;
             ranges::check(&at("energy_per_cycle.limits"), limits)?;
             let images = robot.displacements.as_ref().map(Vec::len);
-            let walked = robot.rollouts.iter().map(|rollout| rollout.displacements.as_ref().map(Vec::len));
-            if let Some(place) = walked.clone().position(|found| found.is_some() && found != images) {
+            let walked = robot
+                .rollouts
+                .iter()
+                .map(|rollout| rollout.displacements.as_ref().map(Vec::len));
+            if let Some(place) = walked
+                .clone()
+                .position(|found| found.is_some() && found != images)
+            {
                 let text = "expected as many as of the unchanged rollout";
-                return Err(Error::at_key(&at(&format!("rollouts[{place}].displacements")), text));
+                return Err(Error::at_key(
+                    &at(&format!("rollouts[{place}].displacements")),
+                    text,
+                ));
             }
         }
         if self.robots.len() > self.elites {
@@ -146,7 +161,11 @@ impl AuditFile {
     /// the current folder, if there are any.
     pub(crate) fn path(run_json: &Path) -> PathBuf {
         let made = folder::beside(run_json, AUDIT_JSON);
-        if exists(&made) { made } else { run_json.with_file_name(AUDIT_JSON) }
+        if exists(&made) {
+            made
+        } else {
+            run_json.with_file_name(AUDIT_JSON)
+        }
     }
 
     /// Reads the verdicts on a run from [`path`](AuditFile::path).
@@ -165,8 +184,10 @@ impl AuditFile {
         let path = &AuditFile::path(run_json);
         let audit = Invocation::new("audit").option("archive", folder::archive(run_json));
         if !exists(path) {
-            let text =
-                format!("{}: there is no such file: these robots have not been audited", path.display());
+            let text = format!(
+                "{}: there is no such file: these robots have not been audited",
+                path.display()
+            );
             return Err(Error::input(text).remedy(Remedy::Run(audit, "audits them")));
         }
         let file = AuditFile::read(path)?;
@@ -186,7 +207,9 @@ impl AuditFile {
                 hash::short(&file.run_sha256),
                 hash::short(fingerprint)
             );
-            return Err(Error::input(text).remedy(Remedy::Run(audit, "audits the run as it is now")));
+            return Err(
+                Error::input(text).remedy(Remedy::Run(audit, "audits the run as it is now"))
+            );
         }
         Ok(file)
     }
@@ -207,12 +230,24 @@ impl AuditFile {
     /// # Errors
     /// Returns an error if there are none, or they are invalid.
     pub(crate) fn near(folder: &Path, run_sha256: &str) -> Result<Self, Error> {
-        let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-        let mut folders: Vec<PathBuf> =
-            std::fs::read_dir(here).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
+        let here = if folder.as_os_str().is_empty() {
+            Path::new(".")
+        } else {
+            folder
+        };
+        let mut folders: Vec<PathBuf> = std::fs::read_dir(here)
+            .into_iter()
+            .flatten()
+            .flatten()
+            .map(|entry| entry.path())
+            .collect();
         folders.sort();
         folders.insert(0, folder.to_path_buf());
-        for path in folders.into_iter().map(|folder| folder.join(AUDIT_JSON)).filter(|path| exists(path)) {
+        for path in folders
+            .into_iter()
+            .map(|folder| folder.join(AUDIT_JSON))
+            .filter(|path| exists(path))
+        {
             let file = AuditFile::read(&path)?;
             if file.run_sha256 == run_sha256 {
                 return Ok(file);
@@ -232,9 +267,15 @@ impl AuditFile {
         let Ok(known) = AuditFile::read(path) else {
             return;
         };
-        let head = |file: &AuditFile| AuditFile { robots: Vec::new(), ..file.clone() };
+        let head = |file: &AuditFile| AuditFile {
+            robots: Vec::new(),
+            ..file.clone()
+        };
         if head(&known) == head(self) {
-            let others = known.robots.into_iter().filter(|robot| self.robot(&robot.id).is_none());
+            let others = known
+                .robots
+                .into_iter()
+                .filter(|robot| self.robot(&robot.id).is_none());
             let others: Vec<RobotAudit> = others.collect();
             self.robots.extend(others);
         }
@@ -247,23 +288,47 @@ impl AuditFile {
 
     /// Encodes the file as JSON: the head on one line, then one line per robot.
     pub fn to_json(&self) -> String {
-        let head = AuditFile { robots: Vec::new(), ..self.clone() };
+        let head = AuditFile {
+            robots: Vec::new(),
+            ..self.clone()
+        };
         by_lines(&head, &self.robots)
     }
 
     /// Encodes `audit.csv`: a line per robot and rollout, the unchanged one first.
     pub(crate) fn to_csv(&self) -> Vec<u8> {
-        let images = self.robots.iter().filter_map(|r| r.displacements.as_ref()).map(Vec::len).max();
+        let images = self
+            .robots
+            .iter()
+            .filter_map(|r| r.displacements.as_ref())
+            .map(Vec::len)
+            .max();
         let images = images.unwrap_or(0);
-        let about = ["id", "task", "verdict", "reason", "persisting", "spread", "drive_per_cycle"];
-        let rollout = ["limits_per_cycle", "rollout", "kept", "distance", "persists"];
+        let about = [
+            "id",
+            "task",
+            "verdict",
+            "reason",
+            "persisting",
+            "spread",
+            "drive_per_cycle",
+        ];
+        let rollout = [
+            "limits_per_cycle",
+            "rollout",
+            "kept",
+            "distance",
+            "persists",
+        ];
         let columns = about.into_iter().chain(rollout).map(str::to_string);
         let columns = columns.chain(table::numbered("displacement", images));
         let rows = self.robots.iter().flat_map(|robot| {
             let Energy { drive, limits } = robot.energy_per_cycle;
             let verdict = (&robot.id, &robot.task, robot.verdict.name(), &robot.reason);
             let about = (verdict, robot.persisting, robot.spread, drive, limits);
-            let row = move |name, compared: Option<(f64, f64, bool)>, displacements: &Option<Vec<f64>>| {
+            let row = move |name,
+                            compared: Option<(f64, f64, bool)>,
+                            displacements: &Option<Vec<f64>>| {
                 let (kept, distance, persists) = compared
                     .map_or((None, None, None), |(kept, distance, persists)| {
                         (Some(kept), Some(distance), Some(persists))

@@ -110,8 +110,14 @@ impl Stored for CapacityFile {
             if task.robots == 0 {
                 return Err(Error::at_key(&at("robots"), "expected one or more"));
             }
-            if self.tasks[..number].iter().any(|other| other.task == task.task) {
-                return Err(Error::at_key(&at("task"), format!("{} is there twice", task.task)));
+            if self.tasks[..number]
+                .iter()
+                .any(|other| other.task == task.task)
+            {
+                return Err(Error::at_key(
+                    &at("task"),
+                    format!("{} is there twice", task.task),
+                ));
             }
             for (number, curve) in task.curves.iter().enumerate() {
                 let at = |key: &str| at(&format!("curves[{number}].{key}"));
@@ -126,7 +132,8 @@ impl Stored for CapacityFile {
                     None => continue,
                     Some(Crossing::At(size) | Crossing::Below { below: size }) => size,
                 };
-                let [least, most] = [sizes().min(), sizes().max()].map(|size| size.unwrap_or(0) as f64);
+                let [least, most] =
+                    [sizes().min(), sizes().max()].map(|size| size.unwrap_or(0) as f64);
                 if !(least..=most).contains(&found) {
                     let text = format!("expected a size from {least} to {most}, found {found:e}");
                     return Err(Error::at_key(&at("capacity"), text));
@@ -149,7 +156,9 @@ impl CapacityFile {
     /// Returns the default path for the analysis of an evaluation: `capacity.json` beside it, or
     /// `gallery-zero_one-capacity.json` beside `gallery-zero_one-eval.json`.
     pub(crate) fn beside(eval: &Path) -> PathBuf {
-        let of = eval.file_name().and_then(|name| name.to_str()?.strip_suffix(EVAL_JSON));
+        let of = eval
+            .file_name()
+            .and_then(|name| name.to_str()?.strip_suffix(EVAL_JSON));
         eval.with_file_name(format!("{}{CAPACITY_JSON}", of.unwrap_or_default()))
     }
 
@@ -169,19 +178,35 @@ impl CapacityFile {
         if let Some(known) = &self.eval_sha256 {
             return *known == report.fingerprint();
         }
-        self.dataset == report.dataset && self.selected == report.selected && self.tasks.iter().all(same)
+        self.dataset == report.dataset
+            && self.selected == report.selected
+            && self.tasks.iter().all(same)
     }
 
     /// Encodes `capacity.csv`: a line per task, network and size.
     pub(crate) fn to_csv(&self) -> Vec<u8> {
-        let columns =
-            ["task", "network", "size", "parameters", "mean", "standard_deviation", "fit", "robots"];
+        let columns = [
+            "task",
+            "network",
+            "size",
+            "parameters",
+            "mean",
+            "standard_deviation",
+            "fit",
+            "robots",
+        ];
         let rows = self.tasks.iter().flat_map(|task| {
             task.curves.iter().flat_map(move |curve| {
                 curve.points.iter().map(move |point| {
                     let network = (&task.task, &curve.network, point.size, point.parameters);
                     let fit = curve.value(point.size as f64);
-                    (network, point.mean, point.standard_deviation, fit, task.accuracy)
+                    (
+                        network,
+                        point.mean,
+                        point.standard_deviation,
+                        fit,
+                        task.accuracy,
+                    )
                 })
             })
         });
@@ -198,7 +223,10 @@ impl CapacityFile {
 impl TaskCapacity {
     /// Returns the capacity for a kind of trained network; the inner `None` means no match.
     pub fn size_of(&self, network: &str) -> Option<Option<Crossing>> {
-        self.curves.iter().find(|curve| curve.network == network).map(|curve| curve.capacity)
+        self.curves
+            .iter()
+            .find(|curve| curve.network == network)
+            .map(|curve| curve.capacity)
     }
 }
 

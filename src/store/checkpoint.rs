@@ -32,10 +32,14 @@ impl Checkpoint {
         self.run.check().map_err(|error| error.in_place("run"))?;
         let RunFile { config, elites, .. } = &self.run;
         let key = |robot: &Robot| config.objective().known_key(&robot.body);
-        match elites.iter().find(|robot| !self.known_bodies.0.contains(&key(robot))) {
-            Some(robot) => {
-                Err(Error::input(format!("known_bodies: expected the body of elite {} among them", robot.id)))
-            }
+        match elites
+            .iter()
+            .find(|robot| !self.known_bodies.0.contains(&key(robot)))
+        {
+            Some(robot) => Err(Error::input(format!(
+                "known_bodies: expected the body of elite {} among them",
+                robot.id
+            ))),
             None => Ok(()),
         }
     }
@@ -60,7 +64,11 @@ impl KnownBodies {
 
 impl From<KnownBodies> for String {
     fn from(known: KnownBodies) -> String {
-        known.0.iter().map(|key| crate::base::hash::hex(key)).collect()
+        known
+            .0
+            .iter()
+            .map(|key| crate::base::hash::hex(key))
+            .collect()
     }
 }
 
@@ -72,7 +80,8 @@ impl TryFrom<String> for KnownBodies {
             u128::from_str_radix(digits, 16).ok().map(u128::to_be_bytes)
         };
         let keys: Option<BTreeSet<_>> = text.as_bytes().chunks(32).map(number).collect();
-        keys.map(KnownBodies).ok_or_else(|| "expected 32 hexadecimal digits per body".to_string())
+        keys.map(KnownBodies)
+            .ok_or_else(|| "expected 32 hexadecimal digits per body".to_string())
     }
 }
 
@@ -86,7 +95,8 @@ pub fn write(folder: &Path, checkpoint: &Checkpoint) -> Result<(), Error> {
         let path = path.to_path_buf();
         move |error| Error::writing(&path, &error)
     };
-    let text = serde_json::to_string(checkpoint).map_err(|error| Error::other(error.to_string()))?;
+    let text =
+        serde_json::to_string(checkpoint).map_err(|error| Error::other(error.to_string()))?;
     let text = format!("{}\n{text}\n", sha256_hex(text.as_bytes()));
     // Only a valid newest checkpoint becomes the previous one: a damaged one must not replace it.
     if let Ok(Some(_)) = content(&newest) {
@@ -102,7 +112,10 @@ pub fn write(folder: &Path, checkpoint: &Checkpoint) -> Result<(), Error> {
 ///
 /// # Errors
 /// Returns an error if all checkpoints are damaged.
-pub(crate) fn read(folder: &Path, mut warn: impl FnMut(String)) -> Result<Option<Checkpoint>, Error> {
+pub(crate) fn read(
+    folder: &Path,
+    mut warn: impl FnMut(String),
+) -> Result<Option<Checkpoint>, Error> {
     let [newest, previous] = CHECKPOINTS.map(|name| folder.join(name));
     let first = match read_one(&newest) {
         Ok(Some(checkpoint)) => return Ok(Some(checkpoint)),
@@ -150,7 +163,9 @@ fn content(path: &Path) -> Result<Option<String>, Error> {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         Err(error) => return Err(Error::reading(path, &error)),
     };
-    let whole = text.split_once('\n').map(|(sum, content)| (sum, content.trim_end()));
+    let whole = text
+        .split_once('\n')
+        .map(|(sum, content)| (sum, content.trim_end()));
     match whole.filter(|(sum, content)| sha256_hex(content.as_bytes()) == *sum) {
         Some((_, content)) => Ok(Some(content.to_string())),
         None => {
@@ -169,14 +184,20 @@ mod tests {
     fn after(generations: u64) -> Checkpoint {
         let mut known_bodies = KnownBodies::default();
         (0..generations).for_each(|n| assert!(known_bodies.insert([n as u8; 16])));
-        let mut run = RunFile { generations, ..samples::run(&[("a", 1.5), ("b", -0.25)]) };
+        let mut run = RunFile {
+            generations,
+            ..samples::run(&[("a", 1.5), ("b", -0.25)])
+        };
         for robot in &mut run.elites {
             robot.id = robot.genome.id();
             known_bodies.insert(body::key(&robot.body));
         }
         Checkpoint {
             run,
-            totals: Totals { evaluations: 20 * generations, ..Totals::default() },
+            totals: Totals {
+                evaluations: 20 * generations,
+                ..Totals::default()
+            },
             known_bodies,
         }
     }
@@ -197,7 +218,10 @@ mod tests {
             write(folder, &after(generations)).unwrap();
             assert_eq!(read_quietly(folder), (Some(after(generations)), false));
         }
-        assert_eq!(read_one(&folder.join(CHECKPOINTS[1])).unwrap(), Some(after(2)));
+        assert_eq!(
+            read_one(&folder.join(CHECKPOINTS[1])).unwrap(),
+            Some(after(2))
+        );
     }
 
     #[test]
@@ -218,7 +242,10 @@ mod tests {
         }
         // Two failed writes in a row.
         write(folder, &after(3)).unwrap();
-        assert_eq!(read_one(&folder.join(CHECKPOINTS[1])).unwrap(), Some(after(1)));
+        assert_eq!(
+            read_one(&folder.join(CHECKPOINTS[1])).unwrap(),
+            Some(after(1))
+        );
         std::fs::write(&newest, b"").unwrap();
         assert_eq!(read_quietly(folder), (Some(after(1)), true));
     }
@@ -230,19 +257,32 @@ mod tests {
         write(folder, &after(1)).unwrap();
         type Spoil = fn(&mut Checkpoint);
         let spoilt: [(&str, Spoil); 6] = [
-            ("voxel counts", |saved| saved.run.elites[1].voxels.muscle += 1),
-            ("id", |saved| saved.run.elites[0].id = "0123456789".to_string()),
-            ("cell", |saved| saved.run.elites[1].cell = saved.run.elites[0].cell.clone()),
-            ("dimensions", |saved| saved.run.dimensions.possible_cells += 1),
+            ("voxel counts", |saved| {
+                saved.run.elites[1].voxels.muscle += 1
+            }),
+            ("id", |saved| {
+                saved.run.elites[0].id = "0123456789".to_string()
+            }),
+            ("cell", |saved| {
+                saved.run.elites[1].cell = saved.run.elites[0].cell.clone()
+            }),
+            ("dimensions", |saved| {
+                saved.run.dimensions.possible_cells += 1
+            }),
             ("format", |saved| saved.run.format_version += 1),
-            ("known_bodies", |saved| saved.known_bodies = KnownBodies::default()),
+            ("known_bodies", |saved| {
+                saved.known_bodies = KnownBodies::default()
+            }),
         ];
         for (word, spoil) in spoilt {
             let mut wrong = after(2);
             spoil(&mut wrong);
             write(folder, &wrong).unwrap();
             let error = read_one(&folder.join(CHECKPOINTS[0])).unwrap_err();
-            assert!(error.message.contains(CHECKPOINTS[0]) && error.message.contains(word), "{error}");
+            assert!(
+                error.message.contains(CHECKPOINTS[0]) && error.message.contains(word),
+                "{error}"
+            );
             // Continues from the previous checkpoint, which is valid.
             assert_eq!(read_quietly(folder), (Some(after(1)), true), "{word}");
             std::fs::remove_file(folder.join(CHECKPOINTS[1])).unwrap();
@@ -260,15 +300,24 @@ mod tests {
         // A folder blocks the newest.
         std::fs::create_dir(folder.join(CHECKPOINTS[0])).unwrap();
         assert!(write(folder, &after(2)).is_err());
-        assert_eq!(read_one(&folder.join(CHECKPOINTS[1])).unwrap(), Some(after(1)));
-        assert_eq!(std::fs::read_dir(folder).unwrap().count(), 2, "nothing half-written is left");
+        assert_eq!(
+            read_one(&folder.join(CHECKPOINTS[1])).unwrap(),
+            Some(after(1))
+        );
+        assert_eq!(
+            std::fs::read_dir(folder).unwrap().count(),
+            2,
+            "nothing half-written is left"
+        );
     }
 
     #[test]
     fn two_broken_ones_are_an_error() {
         let folder = tempfile::tempdir().unwrap();
         let folder = folder.path();
-        CHECKPOINTS.iter().for_each(|name| std::fs::write(folder.join(name), "x").unwrap());
+        CHECKPOINTS
+            .iter()
+            .for_each(|name| std::fs::write(folder.join(name), "x").unwrap());
         let error = read(folder, |_| ()).unwrap_err();
         assert_eq!(error.kind, crate::base::error::ErrorKind::Input);
         assert!(error.message.contains("checksum"));
@@ -281,9 +330,15 @@ mod tests {
         let text = String::from(known.clone());
         assert_eq!(text.len(), 5 * 32);
         assert_eq!(KnownBodies::try_from(text.clone()), Ok(known));
-        assert_eq!(KnownBodies::try_from(String::new()), Ok(KnownBodies::default()));
-        for wrong in [&text[1..], "g0000000000000000000000000000000", "\u{e9}0000000000000000000000000000000"]
-        {
+        assert_eq!(
+            KnownBodies::try_from(String::new()),
+            Ok(KnownBodies::default())
+        );
+        for wrong in [
+            &text[1..],
+            "g0000000000000000000000000000000",
+            "\u{e9}0000000000000000000000000000000",
+        ] {
             assert!(KnownBodies::try_from(wrong.to_string()).is_err(), "{wrong}");
         }
     }

@@ -95,7 +95,11 @@ pub struct Baselines {
     /// That pixel: row, column.
     pub(crate) pixel: [usize; 2],
     /// The accuracy of the nearest of the run's training images; absent for another dataset.
-    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "ranges::share")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "ranges::share"
+    )]
     pub nearest_training_image: Option<f64>,
 }
 
@@ -111,11 +115,19 @@ pub struct Mean {
     #[serde(deserialize_with = "ranges::share")]
     pub(crate) balanced_accuracy: f64,
     /// The standard deviation of the accuracy over the robots; absent for a single one.
-    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "ranges::share")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "ranges::share"
+    )]
     pub(crate) standard_deviation: Option<f64>,
     /// The 95 % bootstrap interval of the mean accuracy: percentiles of 10,000 resamples. With
     /// several runs, it resamples runs and then the robots of each.
-    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "ranges::interval")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "ranges::interval"
+    )]
     pub interval: Option<[f64; 2]>,
 }
 
@@ -172,7 +184,10 @@ pub struct RobotReport {
 impl RobotReport {
     /// Returns the report without displacements.
     pub(crate) fn without_displacements(&self) -> Self {
-        RobotReport { displacements: Vec::new(), ..self.clone() }
+        RobotReport {
+            displacements: Vec::new(),
+            ..self.clone()
+        }
     }
 }
 
@@ -188,10 +203,16 @@ impl Stored for EvalFile {
         let runs = self.runs.len().max(1);
         for (number, robot) in self.robots.iter().enumerate() {
             let refuse = |key: &str, expected: String| {
-                Err(Error::at_key(&format!("robots[{number}].{key}"), format!("expected {expected}")))
+                Err(Error::at_key(
+                    &format!("robots[{number}].{key}"),
+                    format!("expected {expected}"),
+                ))
             };
             if robot.run >= runs {
-                return refuse("run", format!("a place among {runs} runs, from 0, found {}", robot.run));
+                return refuse(
+                    "run",
+                    format!("a place among {runs} runs, from 0, found {}", robot.run),
+                );
             }
             if Direction::named(&robot.first_group_walks).is_none() {
                 return refuse("first_group_walks", "left or right".to_string());
@@ -201,24 +222,45 @@ impl Stored for EvalFile {
                 return refuse("displacements", format!("one for each of {images} images"));
             }
             if robot.right > images {
-                return refuse("right", format!("at most {images}, the images, found {}", robot.right));
+                return refuse(
+                    "right",
+                    format!("at most {images}, the images, found {}", robot.right),
+                );
             }
             if (robot.accuracy - robot.right as f64 / images as f64).abs() > ROUNDING {
-                return refuse("accuracy", format!("right / images, {}/{images}", robot.right));
+                return refuse(
+                    "accuracy",
+                    format!("right / images, {}/{images}", robot.right),
+                );
             }
-            if robot.unstable != robot.displacements.iter().filter(|walk| walk.is_none()).count() {
-                return refuse("unstable", "as many as displacements that are null".to_string());
+            if robot.unstable
+                != robot
+                    .displacements
+                    .iter()
+                    .filter(|walk| walk.is_none())
+                    .count()
+            {
+                return refuse(
+                    "unstable",
+                    "as many as displacements that are null".to_string(),
+                );
             }
             let labels: BTreeSet<u8> = self.images.iter().map(|image| image.label).collect();
             if !robot.per_class.keys().eq(&labels) {
                 return refuse("per_class", "the classes of the images".to_string());
             }
             if let Some(validated) = &robot.validation {
-                validated.check().map_err(|error| error.in_place(&format!("robots[{number}].validation")))?;
+                validated
+                    .check()
+                    .map_err(|error| error.in_place(&format!("robots[{number}].validation")))?;
             }
         }
         for (task, mean) in &self.means {
-            let robots = self.robots.iter().filter(|robot| robot.task == *task).count();
+            let robots = self
+                .robots
+                .iter()
+                .filter(|robot| robot.task == *task)
+                .count();
             if mean.robots != robots || robots == 0 {
                 let text = format!("expected the {robots} of the task, found {}", mean.robots);
                 return Err(Error::at_key(&format!("means.{task}.robots"), text));
@@ -232,10 +274,22 @@ impl EvalFile {
     /// Returns a hash of the runs, the images, the robots and their walks.
     pub(crate) fn fingerprint(&self) -> String {
         let runs: Vec<&String> = self.runs.iter().map(|run| &run.sha256).collect();
-        let walked =
-            self.robots.iter().map(|robot| (robot.run, &robot.id, &robot.task, &robot.displacements));
-        let all = (runs, &self.dataset, &self.images, self.threshold, walked.collect::<Vec<_>>());
-        sha256_hex(serde_json::to_string(&all).expect("texts, numbers and lists are JSON").as_bytes())
+        let walked = self
+            .robots
+            .iter()
+            .map(|robot| (robot.run, &robot.id, &robot.task, &robot.displacements));
+        let all = (
+            runs,
+            &self.dataset,
+            &self.images,
+            self.threshold,
+            walked.collect::<Vec<_>>(),
+        );
+        sha256_hex(
+            serde_json::to_string(&all)
+                .expect("texts, numbers and lists are JSON")
+                .as_bytes(),
+        )
     }
 
     /// Creates the evaluation of these runs' robots; `together` has their common images and tasks.
@@ -279,12 +333,16 @@ impl EvalFile {
     pub(crate) fn transfer(&mut self, name: &str, dataset: &Dataset) {
         self.dataset = name.to_string();
         if let Some(setting) = &mut self.setting {
-            let train_sha256 =
-                dataset.fingerprint(dataset::Split::Train).expect("an evaluation loads both splits");
+            let train_sha256 = dataset
+                .fingerprint(dataset::Split::Train)
+                .expect("an evaluation loads both splits");
             let train_sha256 = replace(&mut setting.train_sha256, train_sha256);
             let shown = setting.data.of(name);
             let own = replace(&mut setting.data, shown).dataset;
-            self.trained_on = Some(DatasetRef { name: own, train_sha256 });
+            self.trained_on = Some(DatasetRef {
+                name: own,
+                train_sha256,
+            });
         }
     }
 
@@ -302,9 +360,15 @@ impl EvalFile {
     /// Describes the selection of the robots for people, including training on another dataset and
     /// an early stop by a signal.
     pub(crate) fn selection(&self) -> String {
-        let stopped = if self.stopped { "; stopped before the last of them" } else { "" };
-        let trained =
-            self.trained_on.as_ref().map_or(String::new(), |own| format!(", trained on {}", own.name));
+        let stopped = if self.stopped {
+            "; stopped before the last of them"
+        } else {
+            ""
+        };
+        let trained = self
+            .trained_on
+            .as_ref()
+            .map_or(String::new(), |own| format!(", trained on {}", own.name));
         format!("{}{trained}{stopped}", self.selected)
     }
 
@@ -327,8 +391,10 @@ impl EvalFile {
                     run.generations,
                     hash::short(&run.sha256)
                 );
-                Err(Error::input(text)
-                    .remedy(Remedy::Run(Invocation::new("eval"), "tests the run as it is now")))
+                Err(Error::input(text).remedy(Remedy::Run(
+                    Invocation::new("eval"),
+                    "tests the run as it is now",
+                )))
             }
         }
     }
@@ -349,21 +415,56 @@ impl EvalFile {
 
     /// Encodes `eval.csv`: a line per robot.
     pub(crate) fn to_csv(&self) -> Vec<u8> {
-        let classes: Vec<u8> =
-            self.robots.first().map_or(Vec::new(), |robot| robot.per_class.keys().copied().collect());
-        let about = ["id", "run_seed", "task", "objective", "first_group_walks", "right", "images"];
-        let shares = ["accuracy", "accuracy_low", "accuracy_high", "balanced_accuracy"];
+        let classes: Vec<u8> = self.robots.first().map_or(Vec::new(), |robot| {
+            robot.per_class.keys().copied().collect()
+        });
+        let about = [
+            "id",
+            "run_seed",
+            "task",
+            "objective",
+            "first_group_walks",
+            "right",
+            "images",
+        ];
+        let shares = [
+            "accuracy",
+            "accuracy_low",
+            "accuracy_high",
+            "balanced_accuracy",
+        ];
         let columns = about.into_iter().chain(shares).map(str::to_string);
         let columns = columns.chain(classes.iter().map(|class| format!("accuracy_{class}")));
-        let columns =
-            columns.chain(["mean_distance", "not_moved", "unstable", "simulated"].map(str::to_string));
+        let columns = columns
+            .chain(["mean_distance", "not_moved", "unstable", "simulated"].map(str::to_string));
         let rows = self.robots.iter().map(|robot| {
-            let seed = self.runs.get(robot.run).map_or(self.run_seed, |run| run.seed);
-            let about = (&robot.id, seed, &robot.task, robot.objective, &robot.first_group_walks);
+            let seed = self
+                .runs
+                .get(robot.run)
+                .map_or(self.run_seed, |run| run.seed);
+            let about = (
+                &robot.id,
+                seed,
+                &robot.task,
+                robot.objective,
+                &robot.first_group_walks,
+            );
             let shares = (robot.accuracy, robot.interval, robot.balanced_accuracy);
             let per_class: Vec<f64> = robot.per_class.values().copied().collect();
-            let simulated = (robot.mean_distance, robot.not_moved, robot.unstable, robot.simulated);
-            (about, robot.right, robot.images, shares, per_class, simulated)
+            let simulated = (
+                robot.mean_distance,
+                robot.not_moved,
+                robot.unstable,
+                robot.simulated,
+            );
+            (
+                about,
+                robot.right,
+                robot.images,
+                shares,
+                per_class,
+                simulated,
+            )
         });
         table::csv(columns, rows)
     }

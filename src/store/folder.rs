@@ -11,9 +11,9 @@ use crate::shipped::read_text;
 use crate::store::lock;
 use crate::store::lock::Lock;
 use crate::store::names::{
-    AUDIT_JSON, CAPACITY_JSON, CHECKPOINTS, CONFIG, DATA_FOLDER, ELITES, EVAL_JSON, EVAL_VALIDATION_JSON,
-    LOCK, METRICS, RESPONSE_JSON, RUN_JSON, TASK_JSON, TASK_LOCK, TEAM_JSON, TEAM_VALIDATION_JSON,
-    TRAINING_JSON, VALIDATION_JSON,
+    AUDIT_JSON, CAPACITY_JSON, CHECKPOINTS, CONFIG, DATA_FOLDER, ELITES, EVAL_JSON,
+    EVAL_VALIDATION_JSON, LOCK, METRICS, RESPONSE_JSON, RUN_JSON, TASK_JSON, TASK_LOCK, TEAM_JSON,
+    TEAM_VALIDATION_JSON, TRAINING_JSON, VALIDATION_JSON,
 };
 use crate::store::run::RunFile;
 use std::ffi::OsStr;
@@ -58,7 +58,10 @@ pub(crate) struct RunFolder {
 
 /// Returns true if a process is working on the run in a folder.
 pub(crate) fn is_in_use(folder: &Path) -> bool {
-    matches!(lock::state(&folder.join(LOCK)), Ok(lock::LockState::Held(_)))
+    matches!(
+        lock::state(&folder.join(LOCK)),
+        Ok(lock::LockState::Held(_))
+    )
 }
 
 impl RunFolder {
@@ -84,15 +87,24 @@ impl RunFolder {
         refuse_run()?;
         let lock = path.join(LOCK);
         let lock = Lock::take(&lock, session).map_err(|refusal| {
-            let held = format!("{}: another morphcog is using this run folder", path.display());
-            refusal.into_error(&lock, &held, "wait for it to end").remedy(Remedy::ChooseOut)
+            let held = format!(
+                "{}: another morphcog is using this run folder",
+                path.display()
+            );
+            refusal
+                .into_error(&lock, &held, "wait for it to end")
+                .remedy(Remedy::ChooseOut)
         })?;
         // Another process may have left its run while this one waited for the lock.
         refuse_run()?;
-        remove_half_written(path, &RunFolder::files()).map_err(|error| Error::writing(path, &error))?;
+        remove_half_written(path, &RunFolder::files())
+            .map_err(|error| Error::writing(path, &error))?;
         if if_exists == IfExists::Overwrite {
             // An unchanged config stays, with its author's comments.
-            for name in RunFolder::files().into_iter().filter(|name| *name != CONFIG) {
+            for name in RunFolder::files()
+                .into_iter()
+                .filter(|name| *name != CONFIG)
+            {
                 let file = path.join(name);
                 match std::fs::remove_file(&file) {
                     Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
@@ -102,7 +114,11 @@ impl RunFolder {
                 }
             }
         }
-        Ok(RunFolder { path: path.to_path_buf(), replaces: if_exists == IfExists::Overwrite, _lock: lock })
+        Ok(RunFolder {
+            path: path.to_path_buf(),
+            replaces: if_exists == IfExists::Overwrite,
+            _lock: lock,
+        })
     }
 
     /// Returns the path of the folder.
@@ -115,7 +131,10 @@ impl RunFolder {
     /// # Errors
     /// If one cannot be written.
     pub(crate) fn write_run(&self, run: &RunFile) -> Result<(), Error> {
-        for (name, content) in [(RUN_JSON, run.to_json().into_bytes()), (ELITES, run.to_csv())] {
+        for (name, content) in [
+            (RUN_JSON, run.to_json().into_bytes()),
+            (ELITES, run.to_csv()),
+        ] {
             let path = self.path.join(name);
             write_atomically(&path, &content).map_err(|error| Error::writing(&path, &error))?;
         }
@@ -139,17 +158,30 @@ impl RunFolder {
         // A run that was killed before its first checkpoint leaves a config that morphcog wrote.
         let is_written = || there.is_some_and(|there| text == Some(there.to_toml()));
         if !self.replaces && path.exists() && vacant(&self.path).is_ok() && !is_written() {
-            let text = format!("{}: there is a file of that name that says something else", path.display());
+            let text = format!(
+                "{}: there is a file of that name that says something else",
+                path.display()
+            );
             let error = Error::occupied(text).remedy(Remedy::MoveAway);
             return Err(error.remedy(Remedy::ChooseOut).remedy(Remedy::Replace));
         }
-        write_atomically(&path, config.to_toml().as_bytes()).map_err(|error| Error::writing(&path, &error))
+        write_atomically(&path, config.to_toml().as_bytes())
+            .map_err(|error| Error::writing(&path, &error))
     }
 
     /// Returns the file names of a run.
     pub(crate) fn files() -> [&'static str; 8] {
         let [newest, previous] = CHECKPOINTS;
-        [RUN_JSON, CONFIG, ELITES, METRICS, DATA_FOLDER, TRAINING_JSON, newest, previous]
+        [
+            RUN_JSON,
+            CONFIG,
+            ELITES,
+            METRICS,
+            DATA_FOLDER,
+            TRAINING_JSON,
+            newest,
+            previous,
+        ]
     }
 }
 
@@ -158,11 +190,16 @@ impl RunFolder {
 /// # Errors
 /// Returns an error if it holds a run.
 pub(crate) fn vacant(folder: &Path) -> Result<(), Error> {
-    let of_run = RunFolder::files().into_iter().filter(|name| ![CONFIG, DATA_FOLDER].contains(name));
+    let of_run = RunFolder::files()
+        .into_iter()
+        .filter(|name| ![CONFIG, DATA_FOLDER].contains(name));
     if !of_run.into_iter().any(|name| folder.join(name).exists()) {
         return Ok(());
     }
-    let text = format!("{}: there is a run in this folder already", folder.display());
+    let text = format!(
+        "{}: there is a run in this folder already",
+        folder.display()
+    );
     let error = Error::occupied(text).remedy(Remedy::Resume);
     Err(error.remedy(Remedy::ChooseOut).remedy(Remedy::Replace))
 }
@@ -178,9 +215,13 @@ pub fn name_of(config: &str) -> String {
     {
         // Uses only the file name, so that the text of a file cannot lead elsewhere.
         let name = Path::new(&run.name).file_name();
-        return name.map_or("run".to_string(), |name| name.to_string_lossy().into_owned());
+        return name.map_or("run".to_string(), |name| {
+            name.to_string_lossy().into_owned()
+        });
     }
-    path.file_stem().map_or("run".to_string(), |stem| stem.to_string_lossy().into_owned())
+    path.file_stem().map_or("run".to_string(), |stem| {
+        stem.to_string_lossy().into_owned()
+    })
 }
 
 /// Checks that results can be written to a file, with a CSV beside it, without overwriting each
@@ -196,8 +237,10 @@ pub(crate) fn check_out(out: &Path, of: &Path, own: &str) -> Result<(), Error> {
     if csv == *out {
         return refuse("expected another ending: the CSV beside the results has that name");
     }
-    let folder_of =
-        |path: &Path| path.parent().and_then(|folder| Path::new(".").join(folder).canonicalize().ok());
+    let folder_of = |path: &Path| {
+        path.parent()
+            .and_then(|folder| Path::new(".").join(folder).canonicalize().ok())
+    };
     let same_folder = folder_of(out) == folder_of(of);
     for path in [out, csv.as_path()] {
         let name = path.file_name();
@@ -205,9 +248,14 @@ pub(crate) fn check_out(out: &Path, of: &Path, own: &str) -> Result<(), Error> {
             return refuse(OF_RUN);
         }
         let is_others = |other: &&&str| {
-            **other != own && name.is_some_and(|name| before_dot(name) == before_dot(other.as_ref()))
+            **other != own
+                && name.is_some_and(|name| before_dot(name) == before_dot(other.as_ref()))
         };
-        if let Some(other) = RESULTS.iter().find(is_others).filter(|_| same_folder || holds_run(path)) {
+        if let Some(other) = RESULTS
+            .iter()
+            .find(is_others)
+            .filter(|_| same_folder || holds_run(path))
+        {
             return refuse(&format!(
                 "expected another name: this is what {other} and what goes with it are called"
             ));
@@ -224,26 +272,34 @@ fn holds_run(path: &Path) -> bool {
 
 /// Yields a path and the target of its link.
 fn meant(path: &Path) -> impl Iterator<Item = PathBuf> {
-    [Some(path.to_path_buf()), path.canonicalize().ok()].into_iter().flatten()
+    [Some(path.to_path_buf()), path.canonicalize().ok()]
+        .into_iter()
+        .flatten()
 }
 
 /// Returns true if a file is, or would be, one of those of a run or a task.
 fn is_of_run(path: &Path) -> bool {
-    let is_one_of =
-        |path: &Path, names: &[&str]| names.iter().any(|name| path.file_name() == Some(name.as_ref()));
+    let is_one_of = |path: &Path, names: &[&str]| {
+        names
+            .iter()
+            .any(|name| path.file_name() == Some(name.as_ref()))
+    };
     meant(path).any(|path| {
         let is_beside_task = path.with_file_name(TASK_JSON).exists();
         holds_run(&path) && is_one_of(&path, &RunFolder::files())
-            || (holds_run(&path) || is_beside_task) && is_one_of(&path, &[TASK_JSON, LOCK, TASK_LOCK])
+            || (holds_run(&path) || is_beside_task)
+                && is_one_of(&path, &[TASK_JSON, LOCK, TASK_LOCK])
     })
 }
 
 /// Returns true if a file is a command's result about a run.
 fn is_result(path: &Path) -> bool {
     let is_it = |path: &Path, result: &&str| {
-        let endings =
-            ["json", "csv", "trainings.json"].map(|ending| Path::new(result).with_extension(ending));
-        endings.iter().any(|name| path.file_name() == Some(name.as_ref()))
+        let endings = ["json", "csv", "trainings.json"]
+            .map(|ending| Path::new(result).with_extension(ending));
+        endings
+            .iter()
+            .any(|name| path.file_name() == Some(name.as_ref()))
     };
     meant(path).any(|path| holds_run(&path) && RESULTS.iter().any(|result| is_it(&path, result)))
 }
@@ -275,7 +331,11 @@ pub(crate) fn of_file(path: &Path) -> Result<(), Error> {
     let last = path.as_os_str().as_encoded_bytes().last();
     let ends_open = last.is_some_and(|&byte| std::path::is_separator(byte.into()));
     match ends_open || path.file_name().is_none() {
-        true => Err(Error::argument("out", path.display(), "expected a file, this is a folder")),
+        true => Err(Error::argument(
+            "out",
+            path.display(),
+            "expected a file, this is a folder",
+        )),
         false => Ok(()),
     }
 }
@@ -295,8 +355,7 @@ pub fn run_json(path: PathBuf) -> Result<Vec<PathBuf>, String> {
     } else if path.is_dir() {
         Ok(vec![path.join(RUN_JSON)])
     } else if path.is_file() && path.extension().is_none_or(|ending| ending != "json") {
-        let text =
-            "expected a run.json, or its folder (runs/pairs/*/, with a slash at the end, means folders only)";
+        let text = "expected a run.json, or its folder (runs/pairs/*/, with a slash at the end, means folders only)";
         Err(text.to_string())
     } else {
         Ok(vec![path])
@@ -313,7 +372,9 @@ pub(crate) fn one_run(path: PathBuf) -> Result<PathBuf, String> {
         [] | [_] => Ok(runs.pop().expect("a path means at least one run")),
         several => {
             let (count, first) = (several.len(), name(&several[0]));
-            Err(format!("expected one run, these are {count}; name one, such as {first}"))
+            Err(format!(
+                "expected one run, these are {count}; name one, such as {first}"
+            ))
         }
     }
 }
@@ -323,7 +384,10 @@ pub(crate) fn one_run(path: PathBuf) -> Result<PathBuf, String> {
 /// # Errors
 /// Returns the errors of [`run_json`].
 pub(crate) fn first_run(path: PathBuf) -> Result<PathBuf, String> {
-    Ok(run_json(path)?.into_iter().next().expect("a path means at least one run"))
+    Ok(run_json(path)?
+        .into_iter()
+        .next()
+        .expect("a path means at least one run"))
 }
 
 /// Returns a run as a value for `--archive`: its name if it ships, else its run.json.
@@ -366,7 +430,9 @@ pub(crate) fn beside_all(archives: &[PathBuf], name: &str) -> PathBuf {
     let Some((of, _)) = archives.iter().find_map(|path| shipped::name(path)) else {
         return above(archives).join(name);
     };
-    match shipped::set(first).filter(|set| others.iter().all(|other| shipped::set(other) == Some(*set))) {
+    match shipped::set(first)
+        .filter(|set| others.iter().all(|other| shipped::set(other) == Some(*set)))
+    {
         // `team.json` of `gallery:team` already has it.
         Some((of, set)) if !name.starts_with(set) => PathBuf::from(format!("{of}-{set}-{name}")),
         _ => PathBuf::from(format!("{of}-{name}")),
@@ -375,12 +441,19 @@ pub(crate) fn beside_all(archives: &[PathBuf], name: &str) -> PathBuf {
 
 /// Returns the folder of a run.json, or the nearest folder that contains several.
 fn above(archives: &[PathBuf]) -> PathBuf {
-    let folders: Vec<&Path> = archives.iter().map(|path| path.parent().unwrap_or(Path::new(""))).collect();
+    let folders: Vec<&Path> = archives
+        .iter()
+        .map(|path| path.parent().unwrap_or(Path::new("")))
+        .collect();
     let Some(first) = folders.first() else {
         return PathBuf::new();
     };
     let holds = |folder: &&Path| folders.iter().all(|other| other.starts_with(folder));
-    first.ancestors().find(holds).unwrap_or(Path::new("")).to_path_buf()
+    first
+        .ancestors()
+        .find(holds)
+        .unwrap_or(Path::new(""))
+        .to_path_buf()
 }
 
 /// Returns the most recent run.json under `runs/`, which commands use by default.

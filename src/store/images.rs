@@ -64,7 +64,9 @@ impl fmt::Display for HeldOut {
 impl FromStr for HeldOut {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
-        let found = [HeldOut::Test, HeldOut::Validation].into_iter().find(|split| split.to_string() == text);
+        let found = [HeldOut::Test, HeldOut::Validation]
+            .into_iter()
+            .find(|split| split.to_string() == text);
         found.ok_or_else(|| "expected test or validation".to_string())
     }
 }
@@ -157,5 +159,12 @@ pub(crate) fn answers(
     displacements: impl IntoIterator<Item = Option<f64>>,
 ) -> Vec<Answer> {
     let all = displacements.into_iter().chain(std::iter::repeat(None));
-    images.iter().zip(all).map(|(image, displacement)| Answer { class: image.label, displacement }).collect()
+    images
+        .iter()
+        .zip(all)
+        .map(|(image, displacement)| Answer {
+            class: image.label,
+            displacement,
+        })
+        .collect()
 }

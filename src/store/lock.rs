@@ -122,8 +122,12 @@ struct LockPolicy {
     dead_after: Duration,
 }
 
-const DEFAULT: LockPolicy =
-    LockPolicy { by_system: true, is_contended: false, beat: BEAT, dead_after: DEAD_AFTER };
+const DEFAULT: LockPolicy = LockPolicy {
+    by_system: true,
+    is_contended: false,
+    beat: BEAT,
+    dead_after: DEAD_AFTER,
+};
 
 /// A taken lock, released on drop. While it exists, this process writes to the folder only what it
 /// may: see [`Ownership`].
@@ -153,11 +157,23 @@ impl Lock {
     /// # Errors
     /// As [`Lock::take`].
     pub(crate) fn take_contended(path: &Path, session: &Session) -> Result<Self, LockRefusal> {
-        Lock::take_in(path, LockPolicy { is_contended: true, ..DEFAULT }, session)
+        Lock::take_in(
+            path,
+            LockPolicy {
+                is_contended: true,
+                ..DEFAULT
+            },
+            session,
+        )
     }
 
     fn take_in(path: &Path, policy: LockPolicy, session: &Session) -> Result<Self, LockRefusal> {
-        let file = File::options().create(true).truncate(false).read(true).write(true).open(path)?;
+        let file = File::options()
+            .create(true)
+            .truncate(false)
+            .read(true)
+            .write(true)
+            .open(path)?;
         let is_locked = lock(&file, policy)?;
         let host = gethostname().to_string_lossy().into_owned();
         if let Some(before) = read(path)? {
@@ -165,14 +181,22 @@ impl Lock {
             let has_ended = is_locked && before.host == host;
             if !has_ended {
                 let seconds = policy.dead_after.as_secs_f64().ceil();
-                let text = format!("{before} was at work here: waiting up to {seconds} s for a sign of life");
-                session.observer.note(&format!("{}: {text}", path.display()));
+                let text = format!(
+                    "{before} was at work here: waiting up to {seconds} s for a sign of life"
+                );
+                session
+                    .observer
+                    .note(&format!("{}: {text}", path.display()));
                 if is_alive(path, &before, policy.dead_after, session)? {
                     return Err(LockRefusal::Held(read(path)?));
                 }
             }
         }
-        let own = Holder { host, process: std::process::id(), beats: now() };
+        let own = Holder {
+            host,
+            process: std::process::id(),
+            beats: now(),
+        };
         write(path, &own)?;
         if !is_locked || policy.is_contended {
             // If two processes found it free at once, the one whose name remains has it.
@@ -186,7 +210,12 @@ impl Lock {
             let own = Arc::clone(&own);
             move || own.check()
         });
-        let mut lock = Lock { own: Arc::clone(&own), heart: None, _ownership: ownership, _file: file };
+        let mut lock = Lock {
+            own: Arc::clone(&own),
+            heart: None,
+            _ownership: ownership,
+            _file: file,
+        };
         let heart = threads::start("heartbeat", move || own.beat(policy.beat));
         lock.heart = Some(heart.map_err(LockRefusal::NoThread)?);
         Ok(lock)
@@ -203,7 +232,10 @@ impl Drop for Lock {
         }
         // If this write fails, the lock is found stale.
         if self.own.check().is_ok() {
-            let _ = File::options().write(true).truncate(true).open(&self.own.path);
+            let _ = File::options()
+                .write(true)
+                .truncate(true)
+                .open(&self.own.path);
         }
     }
 }
@@ -228,8 +260,17 @@ struct Heart {
 
 impl Own {
     fn new(path: &Path, Holder { host, beats, .. }: Holder) -> Self {
-        let state = Mutex::new(Heart { beats, is_over: false });
-        Own { path: path.to_path_buf(), host, first: beats, state, wake: Condvar::new() }
+        let state = Mutex::new(Heart {
+            beats,
+            is_over: false,
+        });
+        Own {
+            path: path.to_path_buf(),
+            host,
+            first: beats,
+            state,
+            wake: Condvar::new(),
+        }
     }
 
     fn state(&self) -> MutexGuard<'_, Heart> {
@@ -246,7 +287,9 @@ impl Own {
 
     /// Does the same while no heartbeat is written.
     fn check_at(&self, heart: &Heart) -> io::Result<()> {
-        let removed = || Lost::Removed { lock: self.path.clone() };
+        let removed = || Lost::Removed {
+            lock: self.path.clone(),
+        };
         let found = match read(&self.path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Err(removed().into()),
             found => found?.ok_or_else(removed)?,
@@ -256,7 +299,11 @@ impl Own {
             && (self.first..=heart.beats + 1).contains(&found.beats);
         match is_own {
             true => Ok(()),
-            false => Err(Lost::Taken { lock: self.path.clone(), holder: found.to_string() }.into()),
+            false => Err(Lost::Taken {
+                lock: self.path.clone(),
+                holder: found.to_string(),
+            }
+            .into()),
         }
     }
 
@@ -264,12 +311,22 @@ impl Own {
     fn beat(&self, pause: Duration) {
         let mut heart = self.state();
         while !heart.is_over {
-            let waited = self.wake.wait_timeout(heart, pause).unwrap_or_else(PoisonError::into_inner);
+            let waited = self
+                .wake
+                .wait_timeout(heart, pause)
+                .unwrap_or_else(PoisonError::into_inner);
             heart = waited.0;
             // The next beat retries a failed write.
             if !heart.is_over && waited.1.timed_out() && self.check_at(&heart).is_ok() {
                 let (host, process) = (self.host.clone(), std::process::id());
-                let beaten = write(&self.path, &Holder { host, process, beats: heart.beats + 1 });
+                let beaten = write(
+                    &self.path,
+                    &Holder {
+                        host,
+                        process,
+                        beats: heart.beats + 1,
+                    },
+                );
                 heart.beats += u64::from(beaten.is_ok());
             }
         }
@@ -278,7 +335,9 @@ impl Own {
 
 /// Returns the nanoseconds since 1970.
 fn now() -> u64 {
-    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    let since = SystemTime::now()
+        .duration_since(SystemTime::UNIX_EPOCH)
+        .unwrap_or_default();
     u64::try_from(since.as_nanos()).unwrap_or_default()
 }
 
@@ -286,9 +345,15 @@ fn now() -> u64 {
 /// slightly longer than a heartbeat, all at once.
 pub(crate) fn states(paths: &[PathBuf]) -> Vec<LockState> {
     // An unreadable file gives no information.
-    let mut all: Vec<LockState> = paths.iter().map(|path| state(path).unwrap_or(LockState::Free)).collect();
+    let mut all: Vec<LockState> = paths
+        .iter()
+        .map(|path| state(path).unwrap_or(LockState::Free))
+        .collect();
     let began = Instant::now();
-    while all.iter().any(|state| matches!(state, LockState::Silent(_))) {
+    while all
+        .iter()
+        .any(|state| matches!(state, LockState::Silent(_)))
+    {
         let is_over = began.elapsed() > BEAT + 2 * LOOK;
         std::thread::sleep(if is_over { Duration::ZERO } else { LOOK });
         for (path, state) in paths.iter().zip(&mut all) {
@@ -316,7 +381,9 @@ pub(crate) fn state(path: &Path) -> io::Result<LockState> {
     let file = match File::options().read(true).write(true).open(path) {
         Err(error) if error.kind() == NotFound => return Ok(LockState::Free),
         // Other users may check, too, and from any machine.
-        Err(error) if [PermissionDenied, ReadOnlyFilesystem].contains(&error.kind()) => File::open(path)?,
+        Err(error) if [PermissionDenied, ReadOnlyFilesystem].contains(&error.kind()) => {
+            File::open(path)?
+        }
         opened => opened?,
     };
     let is_locked = match file.try_lock() {
@@ -422,11 +489,19 @@ mod tests {
     /// Returns a name like that of this process.
     fn own() -> Holder {
         let host = gethostname().to_string_lossy().into_owned();
-        Holder { host, process: std::process::id(), beats: 0 }
+        Holder {
+            host,
+            process: std::process::id(),
+            beats: 0,
+        }
     }
 
     fn elsewhere(path: &Path) {
-        let dead = Holder { host: "another-machine".to_string(), process: 7, beats: 3 };
+        let dead = Holder {
+            host: "another-machine".to_string(),
+            process: 7,
+            beats: 3,
+        };
         std::fs::write(path, "").unwrap();
         write(path, &dead).unwrap();
     }
@@ -438,11 +513,15 @@ mod tests {
         for policy in [DEFAULT, WITHOUT] {
             assert_eq!(read(&path).ok().flatten(), None);
             let lock = Lock::take_in(&path, policy, &Session::default()).unwrap();
-            let Err(LockRefusal::Held(Some(holder))) = Lock::take_in(&path, policy, &Session::default())
+            let Err(LockRefusal::Held(Some(holder))) =
+                Lock::take_in(&path, policy, &Session::default())
             else {
                 panic!("{policy:?}: taken twice")
             };
-            assert_eq!((holder.process, &holder.host), (std::process::id(), &lock.own.host));
+            assert_eq!(
+                (holder.process, &holder.host),
+                (std::process::id(), &lock.own.host)
+            );
             drop(lock);
             assert_eq!(state(&path).unwrap(), LockState::Free);
             drop(Lock::take_in(&path, policy, &Session::default()).unwrap());
@@ -460,7 +539,10 @@ mod tests {
         let before = read(&path).unwrap().unwrap();
         std::thread::sleep(WITHOUT.beat * 5);
         assert!(read(&path).unwrap().unwrap().beats > before.beats);
-        assert!(matches!(Lock::take_in(&path, WITHOUT, &Session::default()), Err(LockRefusal::Held(_))));
+        assert!(matches!(
+            Lock::take_in(&path, WITHOUT, &Session::default()),
+            Err(LockRefusal::Held(_))
+        ));
         drop(lock);
     }
 
@@ -482,9 +564,15 @@ mod tests {
         let stop = AtomicBool::new(false);
         let observer = Stopping(&stop, Mutex::default());
         let session = Session::new(&stop, &observer);
-        assert!(matches!(Lock::take(&path, &session), Err(LockRefusal::Stopped)));
+        assert!(matches!(
+            Lock::take(&path, &session),
+            Err(LockRefusal::Stopped)
+        ));
         let notes = observer.1.into_inner().unwrap();
-        assert!(matches!(&notes[..], [note] if note.contains("process 7 on another-machine")), "{notes:?}");
+        assert!(
+            matches!(&notes[..], [note] if note.contains("process 7 on another-machine")),
+            "{notes:?}"
+        );
         // The name stays: nobody knows yet if that process lives.
         assert_eq!(read(&path).unwrap().unwrap().process, 7);
     }
@@ -495,7 +583,15 @@ mod tests {
         let path = path(&folder);
         let host = gethostname().to_string_lossy().into_owned();
         std::fs::write(&path, "").unwrap();
-        write(&path, &Holder { host: host.clone(), process: 1, beats: 9 }).unwrap();
+        write(
+            &path,
+            &Holder {
+                host: host.clone(),
+                process: 1,
+                beats: 9,
+            },
+        )
+        .unwrap();
         assert!(matches!(state(&path).unwrap(), LockState::Stale(holder) if holder.host == host));
         let began = Instant::now();
         let _lock = Lock::take(&path, &Session::default()).unwrap();
@@ -509,7 +605,12 @@ mod tests {
         elsewhere(&path);
         assert!(matches!(state(&path).unwrap(), LockState::Held(Some(_))));
         let long_ago = SystemTime::now() - Duration::from_secs(3601);
-        File::options().write(true).open(&path).unwrap().set_modified(long_ago).unwrap();
+        File::options()
+            .write(true)
+            .open(&path)
+            .unwrap()
+            .set_modified(long_ago)
+            .unwrap();
         assert!(matches!(state(&path).unwrap(), LockState::Stale(_)));
     }
 
@@ -519,7 +620,12 @@ mod tests {
         let paths = ["alive", "dead"].map(|name| folder.path().join(name));
         let age = |path: &Path| {
             let before = SystemTime::now() - Duration::from_secs(60);
-            File::options().write(true).open(path).unwrap().set_modified(before).unwrap();
+            File::options()
+                .write(true)
+                .open(path)
+                .unwrap()
+                .set_modified(before)
+                .unwrap();
         };
         for path in &paths {
             elsewhere(path);
@@ -529,12 +635,19 @@ mod tests {
         std::thread::scope(|threads| {
             threads.spawn(|| {
                 std::thread::sleep(LOOK);
-                let name = Holder { host: "another-machine".to_string(), process: 7, beats: 4 };
+                let name = Holder {
+                    host: "another-machine".to_string(),
+                    process: 7,
+                    beats: 4,
+                };
                 write(&paths[0], &name).unwrap();
                 age(&paths[0]);
             });
             let states = states(&paths);
-            assert!(matches!(&states[..], [LockState::Held(Some(_)), LockState::Stale(_)]), "{states:?}");
+            assert!(
+                matches!(&states[..], [LockState::Held(Some(_)), LockState::Stale(_)]),
+                "{states:?}"
+            );
         });
     }
 
@@ -547,7 +660,8 @@ mod tests {
                 std::thread::sleep(LOOK / 3);
                 elsewhere(&path);
             });
-            let Err(LockRefusal::Held(Some(holder))) = Lock::take_contended(&path, &Session::default())
+            let Err(LockRefusal::Held(Some(holder))) =
+                Lock::take_contended(&path, &Session::default())
             else {
                 panic!("taken by two")
             };
@@ -559,7 +673,16 @@ mod tests {
 
     #[test]
     fn a_process_that_lost_its_lock_writes_nothing_more_and_leaves_the_lock_to_the_other() {
-        let same_name: fn(&Path) = |path| write(path, &Holder { beats: now(), ..own() }).unwrap();
+        let same_name: fn(&Path) = |path| {
+            write(
+                path,
+                &Holder {
+                    beats: now(),
+                    ..own()
+                },
+            )
+            .unwrap()
+        };
         for others in [elsewhere as fn(&Path), same_name] {
             let folder = tempfile::tempdir().unwrap();
             let path = path(&folder);
@@ -574,10 +697,16 @@ mod tests {
             let error = Error::writing(&result, &write_atomically(&result, b"more").unwrap_err());
             assert_eq!((error.kind, error.kind.exit_code()), (ErrorKind::Lost, 5));
             let holder = read(&path).unwrap().unwrap().to_string();
-            assert!(error.message.contains("run.json: not written") && error.message.contains(&holder));
+            assert!(
+                error.message.contains("run.json: not written") && error.message.contains(&holder)
+            );
             assert!(!error.remedies.is_empty());
             drop(lock);
-            assert_eq!(std::fs::read(&path).unwrap(), before, "the other's name stays");
+            assert_eq!(
+                std::fs::read(&path).unwrap(),
+                before,
+                "the other's name stays"
+            );
             assert_eq!(std::fs::read(&result).unwrap(), b"ours");
         }
     }

@@ -77,16 +77,34 @@ impl Metrics {
             Err(error) if error.kind() == ErrorKind::NotFound => String::new(),
             Err(error) => return Err(Error::reading(&path, &error)),
         };
-        let number = |line: &&str| line.split(',').next().and_then(|first| first.parse::<u64>().ok());
-        let whole = old.split_inclusive('\n').filter(|line| line.ends_with('\n')).map(str::trim_end);
-        let kept = whole.filter(|line| number(line).is_some_and(|generation| generation < generations));
+        let number = |line: &&str| {
+            line.split(',')
+                .next()
+                .and_then(|first| first.parse::<u64>().ok())
+        };
+        let whole = old
+            .split_inclusive('\n')
+            .filter(|line| line.ends_with('\n'))
+            .map(str::trim_end);
+        let kept =
+            whole.filter(|line| number(line).is_some_and(|generation| generation < generations));
         let kept: Vec<String> = kept.map(str::to_string).collect();
         let missing = generations.saturating_sub(kept.len() as u64);
-        let mut text = std::iter::once(HEADER.to_string()).chain(kept).collect::<Vec<_>>().join("\n");
+        let mut text = std::iter::once(HEADER.to_string())
+            .chain(kept)
+            .collect::<Vec<_>>()
+            .join("\n");
         text.push('\n');
         write_atomically(&path, text.as_bytes()).map_err(|error| Error::writing(&path, &error))?;
-        let file = File::options().append(true).open(&path).map_err(|error| Error::writing(&path, &error))?;
-        Ok(Metrics { path, file: BufWriter::new(file), missing })
+        let file = File::options()
+            .append(true)
+            .open(&path)
+            .map_err(|error| Error::writing(&path, &error))?;
+        Ok(Metrics {
+            path,
+            file: BufWriter::new(file),
+            missing,
+        })
     }
 
     /// Adds the line of a generation (from 0).
@@ -99,10 +117,23 @@ impl Metrics {
         stats: &ArchiveStats,
         totals: &Totals,
     ) -> Result<(), Error> {
-        let ArchiveStats { num_elites, coverage, qd_score, norm_qd_score, obj_max, obj_mean } = stats;
+        let ArchiveStats {
+            num_elites,
+            coverage,
+            qd_score,
+            norm_qd_score,
+            obj_max,
+            obj_mean,
+        } = stats;
         let number = |value: &Option<f64>| value.map_or(String::new(), |value| value.to_string());
         let (obj_max, obj_mean) = (number(obj_max), number(obj_mean));
-        let Totals { evaluations, simulated, unstable, seconds, .. } = totals;
+        let Totals {
+            evaluations,
+            simulated,
+            unstable,
+            seconds,
+            ..
+        } = totals;
         writeln!(
             self.file,
             "{generation},{num_elites},{coverage},{qd_score},{norm_qd_score},{obj_max},{obj_mean},{evaluations},\
@@ -169,11 +200,20 @@ pub(crate) fn moments_of(run: &RunFile, archive: &Path) -> Result<Vec<Moment>, E
     let Some(last) = run.generations.checked_sub(1) else {
         return Ok(moments);
     };
-    let ArchiveStats { coverage, qd_score, obj_max, .. } = run.stats;
+    let ArchiveStats {
+        coverage,
+        qd_score,
+        obj_max,
+        ..
+    } = run.stats;
     let is_it = |moment: &&Moment| {
         (moment.coverage, moment.qd_score, moment.obj_max) == (coverage, qd_score, obj_max)
     };
-    match moments.iter().find(|moment| moment.generation == last).filter(is_it) {
+    match moments
+        .iter()
+        .find(|moment| moment.generation == last)
+        .filter(is_it)
+    {
         Some(_) => Ok(moments),
         None => {
             let (metrics, archive) = (archive.with_file_name(METRICS), archive.display());
@@ -188,20 +228,32 @@ pub(crate) fn moments_of(run: &RunFile, archive: &Path) -> Result<Vec<Moment>, E
 }
 
 fn parsed(text: &str) -> Result<Vec<Moment>, Error> {
-    let evolve = || Remedy::Run(Invocation::new("evolve"), "writes this file beside run.json");
+    let evolve = || {
+        Remedy::Run(
+            Invocation::new("evolve"),
+            "writes this file beside run.json",
+        )
+    };
     let mut moments = Vec::new();
     for line in csv::Reader::from_reader(text.as_bytes()).deserialize() {
-        let moment: Moment = line.map_err(|error| Error::input(error.to_string()).remedy(evolve()))?;
-        if let Some(before) = moments.last().filter(|before: &&Moment| before.generation >= moment.generation)
+        let moment: Moment =
+            line.map_err(|error| Error::input(error.to_string()).remedy(evolve()))?;
+        if let Some(before) = moments
+            .last()
+            .filter(|before: &&Moment| before.generation >= moment.generation)
         {
             let (before, found) = (before.generation, moment.generation);
-            let text = format!("generation {found} after {before}: expected a line per generation, in order");
+            let text = format!(
+                "generation {found} after {before}: expected a line per generation, in order"
+            );
             return Err(Error::input(text).remedy(evolve()));
         }
         moments.push(moment);
     }
     match moments.is_empty() {
-        true => Err(Error::input("expected a line per generation, found none".to_string()).remedy(evolve())),
+        true => Err(
+            Error::input("expected a line per generation, found none".to_string()).remedy(evolve()),
+        ),
         false => Ok(moments),
     }
 }
@@ -220,7 +272,10 @@ mod tests {
     fn write(folder: &Path, from: u64, to: u64, evaluations: u64) {
         let mut metrics = Metrics::open(folder, from).unwrap();
         let stats = Archive::<()>::new().stats(90, 0.0);
-        let totals = Totals { evaluations, ..Totals::default() };
+        let totals = Totals {
+            evaluations,
+            ..Totals::default()
+        };
         (from..to).for_each(|generation| metrics.write(generation, &stats, &totals).unwrap());
         metrics.flush().unwrap();
     }
@@ -231,7 +286,10 @@ mod tests {
         write(folder.path(), 0, 2, 7);
         let lines = lines(folder.path());
         let columns = HEADER.split(',').count();
-        assert!(lines.len() == 3 && lines.iter().all(|line| line.split(',').count() == columns), "{lines:?}");
+        assert!(
+            lines.len() == 3 && lines.iter().all(|line| line.split(',').count() == columns),
+            "{lines:?}"
+        );
         assert_eq!(lines[1], "0,0,0,0,0,,,7,0,0,0,0,0,0,0.000");
     }
 
@@ -283,16 +341,31 @@ mod tests {
         assert_eq!(lines(folder.path()), [HEADER]);
         std::fs::remove_file(folder.path().join("metrics.csv")).unwrap();
         write(folder.path(), 4, 5, 1);
-        assert_eq!(lines(folder.path()).len(), 2, "a lost file is no reason not to go on");
-        assert_eq!([5, 4].map(|from| Metrics::open(folder.path(), from).unwrap().missing), [4, 4]);
+        assert_eq!(
+            lines(folder.path()).len(),
+            2,
+            "a lost file is no reason not to go on"
+        );
+        assert_eq!(
+            [5, 4].map(|from| Metrics::open(folder.path(), from).unwrap().missing),
+            [4, 4]
+        );
     }
 
     #[test]
     fn metrics_are_read_by_the_names_of_their_columns() {
-        let text = "generation,coverage,qd_score,obj_max,evaluations\n0,0.1,2,,20\n1,0.2,3,1.5,40\n";
+        let text =
+            "generation,coverage,qd_score,obj_max,evaluations\n0,0.1,2,,20\n1,0.2,3,1.5,40\n";
         let moments = parsed(text).unwrap();
         assert_eq!((moments[0].obj_max, moments[1].obj_max), (None, Some(1.5)));
-        assert_eq!((moments[1].evaluations, moments[1].coverage, moments[1].qd_score), (40.0, 0.2, 3.0));
+        assert_eq!(
+            (
+                moments[1].evaluations,
+                moments[1].coverage,
+                moments[1].qd_score
+            ),
+            (40.0, 0.2, 3.0)
+        );
     }
 
     #[test]

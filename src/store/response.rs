@@ -87,7 +87,12 @@ impl ResponseSetting {
     /// Returns true if both have the same task, dataset, stimulus and windows.
     fn asks_as(&self, other: &ResponseSetting) -> bool {
         let asked = |setting: &ResponseSetting| {
-            (setting.task.clone(), setting.dataset.clone(), setting.stimulus, setting.windows)
+            (
+                setting.task.clone(),
+                setting.dataset.clone(),
+                setting.stimulus,
+                setting.windows,
+            )
         };
         asked(self) == asked(other)
     }
@@ -208,7 +213,8 @@ pub struct TrainingEstimate {
 
 impl From<Trainability> for TrainingEstimate {
     fn from(teachable: Trainability) -> Self {
-        let interval = |estimate: Estimate, least: f64| estimate.interval().map(|end| end.clamp(least, 1.0));
+        let interval =
+            |estimate: Estimate, least: f64| estimate.interval().map(|end| end.clamp(least, 1.0));
         let Trainability { fitness, accuracy } = teachable;
         TrainingEstimate {
             fitness: fitness.value,
@@ -230,18 +236,25 @@ impl RobotResponse {
         ended_by: EndedBy,
         taught: Option<TrainingEstimate>,
     ) -> Self {
-        let places = gait.places().iter().zip(response.slopes.iter().zip(&response.errors));
-        let place = |(&(row, column), (&slope, &error)): (&(usize, usize), (&f64, &f64))| ResponsePlace {
-            row,
-            column,
-            slope,
-            error,
-        };
+        let places = gait
+            .places()
+            .iter()
+            .zip(response.slopes.iter().zip(&response.errors));
+        let place =
+            |(&(row, column), (&slope, &error)): (&(usize, usize), (&f64, &f64))| ResponsePlace {
+                row,
+                column,
+                slope,
+                error,
+            };
         RobotResponse {
             id: id.to_string(),
             body: gait.built(&gait.design()),
             rollouts: displacements.len(),
-            unstable: displacements.iter().filter(|displacement| displacement.is_none()).count(),
+            unstable: displacements
+                .iter()
+                .filter(|displacement| displacement.is_none())
+                .count(),
             displacements,
             ended_by,
             relative_error: response.relative_error(),
@@ -266,20 +279,35 @@ impl Stored for ResponseFile {
         }
         for (number, robot) in self.robots.iter().enumerate() {
             let refuse = |key: &str, expected: &str| {
-                Err(Error::at_key(&format!("robots[{number}].{key}"), format!("expected {expected}")))
+                Err(Error::at_key(
+                    &format!("robots[{number}].{key}"),
+                    format!("expected {expected}"),
+                ))
             };
-            if self.robots[..number].iter().any(|other| other.id == robot.id) {
+            if self.robots[..number]
+                .iter()
+                .any(|other| other.id == robot.id)
+            {
                 return refuse("id", "each robot once");
             }
             let places = robot.places.iter().map(|place| (place.row, place.column));
             let gait = Gait::of(&robot.body);
             if !gait.is_some_and(|gait| gait.places().iter().copied().eq(places)) {
-                return refuse("places", "the soft voxels and sensors of its body, row-major");
+                return refuse(
+                    "places",
+                    "the soft voxels and sensors of its body, row-major",
+                );
             }
             if robot.rollouts != robot.displacements.len() {
                 return refuse("displacements", "one for each of the rollouts");
             }
-            if robot.unstable != robot.displacements.iter().filter(|walk| walk.is_none()).count() {
+            if robot.unstable
+                != robot
+                    .displacements
+                    .iter()
+                    .filter(|walk| walk.is_none())
+                    .count()
+            {
                 return refuse("unstable", "as many as displacements that are null");
             }
             if robot.intercepts.len() > self.setting.conditions.len() {
@@ -304,7 +332,11 @@ impl ResponseFile {
         if !exists(path) {
             return None;
         }
-        let told = |error| session.observer.warning(&format!("{error}; responses are measured again"));
+        let told = |error| {
+            session
+                .observer
+                .warning(&format!("{error}; responses are measured again"))
+        };
         ResponseFile::read(path).map_err(told).ok()
     }
 
@@ -326,14 +358,25 @@ impl ResponseFile {
         let begun = self.unfinished.iter().find(|robot| has_gait(&robot.body));
         let ended: &[Option<f64>] = ended.map_or(&[], |robot| &robot.displacements);
         let begun: &[Option<f64>] = begun.map_or(&[], |robot| &robot.displacements);
-        (if begun.len() > ended.len() { begun } else { ended }, ended.len())
+        (
+            if begun.len() > ended.len() {
+                begun
+            } else {
+                ended
+            },
+            ended.len(),
+        )
     }
 
     /// Returns true if it was measured for the run with this SHA-256, by this version, under these
     /// conditions and random images.
     fn is_of(&self, run_sha256: &str, seed: u64, conditions: &[Condition]) -> bool {
         let by_this = self.program_version == env!("CARGO_PKG_VERSION");
-        let ResponseSetting { seed: own, conditions: shown, .. } = &self.setting;
+        let ResponseSetting {
+            seed: own,
+            conditions: shown,
+            ..
+        } = &self.setting;
         self.run_sha256 == run_sha256 && by_this && *own == seed && shown == conditions
     }
 
@@ -341,34 +384,57 @@ impl ResponseFile {
     /// estimates for another task.
     pub(crate) fn with_others_of(&self, earlier: &ResponseFile) -> Self {
         let mut all = self.clone();
-        if earlier.is_of(&self.run_sha256, self.setting.seed, &self.setting.conditions) {
-            let is_other = |robot: &&RobotResponse| self.robots.iter().all(|own| own.id != robot.id);
+        if earlier.is_of(
+            &self.run_sha256,
+            self.setting.seed,
+            &self.setting.conditions,
+        ) {
+            let is_other =
+                |robot: &&RobotResponse| self.robots.iter().all(|own| own.id != robot.id);
             for robot in earlier.robots.iter().filter(is_other) {
-                let taught = robot.taught.filter(|_| earlier.setting.asks_as(&self.setting));
-                all.robots.push(RobotResponse { taught, ..robot.clone() });
+                let taught = robot
+                    .taught
+                    .filter(|_| earlier.setting.asks_as(&self.setting));
+                all.robots.push(RobotResponse {
+                    taught,
+                    ..robot.clone()
+                });
             }
             let is_open = |robot: &&Unfinished| {
                 let ended = self.robots.iter().map(|own| &own.id);
-                ended.chain(self.unfinished.iter().map(|own| &own.id)).all(|id| *id != robot.id)
+                ended
+                    .chain(self.unfinished.iter().map(|own| &own.id))
+                    .all(|id| *id != robot.id)
             };
-            all.unfinished.extend(earlier.unfinished.iter().filter(is_open).cloned());
+            all.unfinished
+                .extend(earlier.unfinished.iter().filter(is_open).cloned());
         }
         all
     }
 
     /// Encodes the file as JSON: the head on one line, then one line per robot.
     pub(crate) fn to_json(&self) -> String {
-        let head = ResponseFile { robots: Vec::new(), ..self.clone() };
+        let head = ResponseFile {
+            robots: Vec::new(),
+            ..self.clone()
+        };
         by_lines(&head, &self.robots)
     }
 
     /// Encodes `response.csv`: a line per robot and place.
     pub(crate) fn to_csv(&self) -> Vec<u8> {
         let rows = self.robots.iter().flat_map(|robot| {
-            robot.places.iter().map(|ResponsePlace { row, column, slope, error }| {
-                let material = robot.body.voxels()[(*row, *column)].code();
-                (&robot.id, *row, *column, material, *slope, *error)
-            })
+            robot.places.iter().map(
+                |ResponsePlace {
+                     row,
+                     column,
+                     slope,
+                     error,
+                 }| {
+                    let material = robot.body.voxels()[(*row, *column)].code();
+                    (&robot.id, *row, *column, material, *slope, *error)
+                },
+            )
         });
         table::csv(["id", "row", "column", "material", "slope", "error"], rows)
     }
@@ -379,13 +445,21 @@ impl ResponseFile {
     /// # Errors
     /// Returns an error if a file cannot be written.
     pub(crate) fn write(&self, path: &Path, outdated: &[[PathBuf; 2]]) -> Result<(), Error> {
-        write_with_table(path, &self.to_json(), &self.to_csv(), outdated.iter().flatten().cloned())
+        write_with_table(
+            path,
+            &self.to_json(),
+            &self.to_csv(),
+            outdated.iter().flatten().cloned(),
+        )
     }
 }
 
 /// Returns the SVG and PNG paths of robots' pictures beside `out`; one robot alone has its stem.
 pub(crate) fn pictures(out: &Path, ids: &[&str]) -> Vec<[PathBuf; 2]> {
-    let stem = out.file_stem().expect("its name was checked before anything was measured").to_string_lossy();
+    let stem = out
+        .file_stem()
+        .expect("its name was checked before anything was measured")
+        .to_string_lossy();
     let named = |id: &&str| match ids.len() {
         1 => PICTURES.map(|ending| out.with_extension(ending)),
         _ => PICTURES.map(|ending| out.with_file_name(format!("{stem}-{id}.{ending}"))),

@@ -34,7 +34,11 @@ pub(crate) trait Stored: DeserializeOwned {
 /// Returns an error, with its line or key, if the file is missing or invalid.
 pub(crate) fn read<T: Stored>(path: &Path, maker: Option<&'static str>) -> Result<T, Error> {
     let text = read_text(path).map_err(|error| match maker {
-        Some(command) => Error::reading_or(path, &error, Remedy::Run(Invocation::new(command), "makes one")),
+        Some(command) => Error::reading_or(
+            path,
+            &error,
+            Remedy::Run(Invocation::new(command), "makes one"),
+        ),
         None => Error::reading(path, &error),
     })?;
     parse(&text, &path.display().to_string())
@@ -46,7 +50,9 @@ pub(crate) fn read<T: Stored>(path: &Path, maker: Option<&'static str>) -> Resul
 /// Returns the errors of [`read`].
 pub(crate) fn parse<T: Stored>(text: &str, name: &str) -> Result<T, Error> {
     let file: T = reading::read_versioned(text, name, T::FORMAT.0, T::FORMAT.1)?;
-    file.check().map(|()| file).map_err(|error| error.in_place(name))
+    file.check()
+        .map(|()| file)
+        .map_err(|error| error.in_place(name))
 }
 
 /// Reads the file that results are about to replace, if it exists.
@@ -59,14 +65,21 @@ pub(crate) fn replaced<T: Stored>(path: &Path) -> Result<Option<T>, Error> {
         return Ok(None);
     }
     let refuse = |error: Error| error.advice("move it away: it would be written over");
-    read(path, None).map(Some).map_err(|error| refuse(error).remedy(Remedy::ChooseOut))
+    read(path, None)
+        .map(Some)
+        .map_err(|error| refuse(error).remedy(Remedy::ChooseOut))
 }
 
 /// Encodes an object whose last key is a list: the head on one line, then a line for each item.
 pub(crate) fn by_lines(head: &impl Serialize, list: &[impl Serialize]) -> String {
     let head = serde_json::to_string(head).expect(JSON);
-    let head = head.strip_suffix("]}").expect("the last key of the head is an empty list");
-    let lines: Vec<String> = list.iter().map(|one| serde_json::to_string(one).expect(JSON)).collect();
+    let head = head
+        .strip_suffix("]}")
+        .expect("the last key of the head is an empty list");
+    let lines: Vec<String> = list
+        .iter()
+        .map(|one| serde_json::to_string(one).expect(JSON))
+        .collect();
     format!("{head}\n{}\n]}}\n", lines.join(",\n"))
 }
 
@@ -75,7 +88,11 @@ pub(crate) fn by_lines(head: &impl Serialize, list: &[impl Serialize]) -> String
 ///
 /// # Errors
 /// If it cannot be read or renamed.
-pub(crate) fn make_room(path: &Path, is_same: impl FnOnce() -> bool, session: &Session) -> Result<(), Error> {
+pub(crate) fn make_room(
+    path: &Path,
+    is_same: impl FnOnce() -> bool,
+    session: &Session,
+) -> Result<(), Error> {
     if !path.is_file() || is_same() {
         return Ok(());
     }
@@ -96,9 +113,10 @@ pub(crate) fn make_room(path: &Path, is_same: impl FnOnce() -> bool, session: &S
         }
     }
     let (path, aside) = (path.display(), aside(path));
-    session
-        .observer
-        .warning(&format!("{path}: held the results of another test; they are in {} now", aside.display()));
+    session.observer.warning(&format!(
+        "{path}: held the results of another test; they are in {} now",
+        aside.display()
+    ));
     Ok(())
 }
 
@@ -123,9 +141,14 @@ pub(crate) fn write_with_table(
             _ => {}
         }
     }
-    [(&path.with_extension("csv"), table), (&path.to_path_buf(), json.as_bytes())].into_iter().try_for_each(
-        |(path, content)| write_atomically(path, content).map_err(|error| Error::writing(path, &error)),
-    )
+    [
+        (&path.with_extension("csv"), table),
+        (&path.to_path_buf(), json.as_bytes()),
+    ]
+    .into_iter()
+    .try_for_each(|(path, content)| {
+        write_atomically(path, content).map_err(|error| Error::writing(path, &error))
+    })
 }
 
 #[cfg(test)]
@@ -189,17 +212,28 @@ mod tests {
     fn every_file_that_ships_is_read() {
         let all = shipped();
         assert!(all.len() > 150, "{}", all.len());
-        for path in all.iter().filter(|path| path.extension().is_some_and(|ending| ending == "json")) {
+        for path in all
+            .iter()
+            .filter(|path| path.extension().is_some_and(|ending| ending == "json"))
+        {
             let name = path.file_name().unwrap().to_str().unwrap();
             let text = read_text(path).unwrap();
-            assert_eq!(refusal(name, &text).map(|error| error.message), None, "{}", path.display());
+            assert_eq!(
+                refusal(name, &text).map(|error| error.message),
+                None,
+                "{}",
+                path.display()
+            );
         }
     }
 
     /// Returns the smallest shipped file of each kind, and one of a training.
     fn samples() -> Vec<(String, Value)> {
         let mut smallest = std::collections::BTreeMap::<String, String>::new();
-        for path in shipped().iter().filter(|path| path.extension().is_some_and(|ending| ending == "json")) {
+        for path in shipped()
+            .iter()
+            .filter(|path| path.extension().is_some_and(|ending| ending == "json"))
+        {
             let name = path.file_name().unwrap().to_str().unwrap().to_string();
             let text = read_text(path).unwrap();
             let known = smallest.entry(name).or_insert_with(|| text.clone());
@@ -207,9 +241,18 @@ mod tests {
                 *known = text;
             }
         }
-        let training = File::new("key".to_string(), vec![vec![Some(1.5), None], vec![Some(-2.5)]]);
-        smallest.insert("training.json".to_string(), serde_json::to_string(&training).unwrap());
-        smallest.into_iter().map(|(name, text)| (name, serde_json::from_str(&text).unwrap())).collect()
+        let training = File::new(
+            "key".to_string(),
+            vec![vec![Some(1.5), None], vec![Some(-2.5)]],
+        );
+        smallest.insert(
+            "training.json".to_string(),
+            serde_json::to_string(&training).unwrap(),
+        );
+        smallest
+            .into_iter()
+            .map(|(name, text)| (name, serde_json::from_str(&text).unwrap()))
+            .collect()
     }
 
     /// Finds a number of every kind in a value; in lists, in the first item.
@@ -217,10 +260,14 @@ mod tests {
         match value {
             Value::Number(_) => found.push(at.to_string()),
             Value::Array(items) => {
-                items.iter().take(1).for_each(|item| numbers(item, &format!("{at}/0"), found));
+                items
+                    .iter()
+                    .take(1)
+                    .for_each(|item| numbers(item, &format!("{at}/0"), found));
             }
             Value::Object(keys) => {
-                keys.iter().for_each(|(key, value)| numbers(value, &format!("{at}/{key}"), found));
+                keys.iter()
+                    .for_each(|(key, value)| numbers(value, &format!("{at}/{key}"), found));
             }
             _ => {}
         }
@@ -229,7 +276,11 @@ mod tests {
     #[test]
     fn no_number_of_any_file_may_be_endless_and_errors_name_file_and_key() {
         for (name, sample) in samples() {
-            assert_eq!(refusal(&name, &sample.to_string()).map(|error| error.message), None, "{name}");
+            assert_eq!(
+                refusal(&name, &sample.to_string()).map(|error| error.message),
+                None,
+                "{name}"
+            );
             let mut places = Vec::new();
             numbers(&sample, "", &mut places);
             // A setting may be infinite, such as the seconds between two checkpoints.
@@ -240,12 +291,20 @@ mod tests {
                     let mut changed = sample.clone();
                     *changed.pointer_mut(&place).unwrap() = Value::from(number);
                     let error = refusal(&name, &changed.to_string());
-                    let error = error.unwrap_or_else(|| panic!("{name}: {place} = {number} is taken"));
-                    assert!(error.message.starts_with(&format!("{name}:")), "{place}: {error}");
+                    let error =
+                        error.unwrap_or_else(|| panic!("{name}: {place} = {number} is taken"));
+                    assert!(
+                        error.message.starts_with(&format!("{name}:")),
+                        "{place}: {error}"
+                    );
                     // The key, or the section that contains it.
-                    let mut keys =
-                        place.split('/').filter(|key| !key.is_empty() && key.parse::<u8>().is_err());
-                    assert!(keys.any(|key| error.message.contains(key)), "{place}: {error}");
+                    let mut keys = place
+                        .split('/')
+                        .filter(|key| !key.is_empty() && key.parse::<u8>().is_err());
+                    assert!(
+                        keys.any(|key| error.message.contains(key)),
+                        "{place}: {error}"
+                    );
                 }
             }
         }
@@ -285,14 +344,23 @@ mod tests {
             ("training.json", "/checksum", "null"),
             ("training.json", "/rollouts/0", "[1.5]"),
             ("training.json", "/rollouts", "[[-2.5], [1.5, null]]"),
-            ("training.json", "/rollouts", "[[1.5, null], [-2.5], [-2.5]]"),
+            (
+                "training.json",
+                "/rollouts",
+                "[[1.5, null], [-2.5], [-2.5]]",
+            ),
             ("training.json", "/rollouts/0/0", "1.5000000000000002"),
         ] {
             let mut changed = samples[name].clone();
-            *changed.pointer_mut(place).unwrap_or_else(|| panic!("{name}: {place}")) = number(value);
+            *changed
+                .pointer_mut(place)
+                .unwrap_or_else(|| panic!("{name}: {place}")) = number(value);
             let error = refusal(name, &changed.to_string());
             let error = error.unwrap_or_else(|| panic!("{name}: {place} = {value} is taken"));
-            assert!(error.message.starts_with(&format!("{name}:")), "{place} = {value}: {error}");
+            assert!(
+                error.message.starts_with(&format!("{name}:")),
+                "{place} = {value}: {error}"
+            );
         }
         // An earlier version wrote no checksum.
         let mut old = samples["training.json"].clone();

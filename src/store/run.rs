@@ -30,7 +30,8 @@ pub(crate) const FORMAT: &str = "morphcog-run";
 pub(crate) const FORMAT_VERSION: u32 = 1;
 
 /// The arguments that stand for a run.
-const WHAT_RUNS: &str = "expected a run.json, its folder, or runs that ship, such as gallery:zero_one";
+const WHAT_RUNS: &str =
+    "expected a run.json, its folder, or runs that ship, such as gallery:zero_one";
 
 /// A robot: a genome, its body, and its walks under the training images.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -65,8 +66,15 @@ impl Robot {
     /// Returns the bins of its three voxel counts.
     pub fn bins(&self) -> Vec<usize> {
         let area = self.body.voxels().area();
-        let VoxelCounts { muscle, sensor, total, .. } = self.voxels;
-        [muscle, sensor, total].map(|count| count_bin(count, area)).to_vec()
+        let VoxelCounts {
+            muscle,
+            sensor,
+            total,
+            ..
+        } = self.voxels;
+        [muscle, sensor, total]
+            .map(|count| count_bin(count, area))
+            .to_vec()
     }
 }
 
@@ -96,7 +104,12 @@ impl Dimensions {
         let (names, bins) = space.dimensions().iter().cloned().unzip();
         let area = config.body.height * config.body.width;
         let possible_cells = possible_cells(area, config.body.min_muscles, tasks.len()).len();
-        Ok(Dimensions { names, bins, possible_cells, tasks })
+        Ok(Dimensions {
+            names,
+            bins,
+            possible_cells,
+            tasks,
+        })
     }
 }
 
@@ -152,18 +165,33 @@ impl Stored for RunFile {
         }
         let (grouping, names) = (self.config.grouping()?, &self.dimensions.tasks);
         let are_called = grouping.tasks().len() == names.len()
-            && grouping.tasks().iter().zip(names).all(|(split, name)| split.is_called(name));
-        let of_config = Dimensions { tasks: names.clone(), ..Dimensions::of(&self.config)? };
+            && grouping
+                .tasks()
+                .iter()
+                .zip(names)
+                .all(|(split, name)| split.is_called(name));
+        let of_config = Dimensions {
+            tasks: names.clone(),
+            ..Dimensions::of(&self.config)?
+        };
         if !are_called || self.dimensions != of_config {
-            return Err(Error::input("dimensions: they are not those of the config".to_string()));
+            return Err(Error::input(
+                "dimensions: they are not those of the config".to_string(),
+            ));
         }
-        let shown: BTreeSet<u8> = self.training_images.iter().map(|image| image.label).collect();
+        let shown: BTreeSet<u8> = self
+            .training_images
+            .iter()
+            .map(|image| image.label)
+            .collect();
         let classes: BTreeSet<u8> = self.config.classes().into_iter().collect();
         // Older trainings may lack images of a class, but have some of both groups.
         let are_enough = match (&self.origin, &self.config.task.groups) {
             (Some(_), Some(groups)) => {
                 shown.is_subset(&classes)
-                    && groups.iter().all(|group| group.iter().any(|class| shown.contains(class)))
+                    && groups
+                        .iter()
+                        .all(|group| group.iter().any(|class| shown.contains(class)))
             }
             _ => shown == classes,
         };
@@ -176,7 +204,9 @@ impl Stored for RunFile {
             let refuse = |what: &str| Err(Error::input(format!("elite {}: {what}", robot.id)));
             let (height, width) = (self.config.body.height, self.config.body.width);
             if (robot.body.height(), robot.body.width()) != (height, width) {
-                return refuse(&format!("its body is not {height} × {width} voxels, as the config says"));
+                return refuse(&format!(
+                    "its body is not {height} × {width} voxels, as the config says"
+                ));
             }
             if !robot.genome.has_id(&robot.id) {
                 return refuse("its id is not its genome's");
@@ -197,7 +227,10 @@ impl Stored for RunFile {
                 return refuse("it has not one displacement per training image");
             }
         }
-        let stats = self.archive()?.stats(self.dimensions.possible_cells, self.config.archive.qd_offset);
+        let stats = self.archive()?.stats(
+            self.dimensions.possible_cells,
+            self.config.archive.qd_offset,
+        );
         match stats == self.stats {
             true => Ok(()),
             false => Err(Error::at_key("stats", "expected the figures of the elites")),
@@ -230,7 +263,10 @@ impl RunFile {
             dimensions,
             origin: None,
             generations,
-            elites: archive.elites().map(|elite| elite.solution.clone()).collect(),
+            elites: archive
+                .elites()
+                .map(|elite| elite.solution.clone())
+                .collect(),
             read_sha256: None,
         })
     }
@@ -240,8 +276,8 @@ impl RunFile {
     /// # Errors
     /// Returns an error, with its line and key, if the file is missing or invalid.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text =
-            read_text(path).map_err(|error| Error::reading_or(path, &error, Remedy::advice(WHAT_RUNS)))?;
+        let text = read_text(path)
+            .map_err(|error| Error::reading_or(path, &error, Remedy::advice(WHAT_RUNS)))?;
         RunFile::parse(&text, &path.display().to_string())
     }
 
@@ -276,7 +312,10 @@ impl RunFile {
     /// Returns the errors of [`RunFile::read`].
     pub(crate) fn parse(text: &str, name: &str) -> Result<Self, Error> {
         let run: RunFile = results::parse(text, name)?;
-        Ok(RunFile { read_sha256: Some(sha256_hex(text.as_bytes())), ..run })
+        Ok(RunFile {
+            read_sha256: Some(sha256_hex(text.as_bytes())),
+            ..run
+        })
     }
 
     fn space(&self) -> DescriptorSpace {
@@ -291,7 +330,10 @@ impl RunFile {
 
     /// Formats a fitness with its unit.
     pub(crate) fn in_units(&self, objective: f64) -> String {
-        let unit = self.fitness().unit().map_or(String::new(), |unit| format!(" {unit}"));
+        let unit = self
+            .fitness()
+            .unit()
+            .map_or(String::new(), |unit| format!(" {unit}"));
         format!("{}{unit}", number::fixed(objective, 2))
     }
 
@@ -306,12 +348,17 @@ impl RunFile {
     /// Returns the fittest elite, or the one in the first cell if several are equal.
     pub fn best(&self) -> Option<&Robot> {
         let fitter = |best: &&Robot, robot: &&Robot| robot.objective > best.objective;
-        self.elites.iter().reduce(|best, robot| if fitter(&best, &robot) { robot } else { best })
+        self.elites
+            .iter()
+            .reduce(|best, robot| if fitter(&best, &robot) { robot } else { best })
     }
 
     /// Returns an elite's answers to the training images.
     pub(crate) fn answers(&self, robot: &Robot) -> Vec<Answer> {
-        answers(&self.training_images, robot.displacements.iter().copied().map(Some))
+        answers(
+            &self.training_images,
+            robot.displacements.iter().copied().map(Some),
+        )
     }
 
     /// Returns the judge of a robot's walks, or `None` for a gait or a robot of the same-way task.
@@ -320,8 +367,14 @@ impl RunFile {
             return None;
         }
         let grouping = self.config.grouping().ok()?;
-        let split = grouping.tasks().iter().find(|split| split.is_called(&robot.task))?;
-        Readout::of(split, Assignment::from_training(split, self.fitness(), &self.answers(robot)))
+        let split = grouping
+            .tasks()
+            .iter()
+            .find(|split| split.is_called(&robot.task))?;
+        Readout::of(
+            split,
+            Assignment::from_training(split, self.fitness(), &self.answers(robot)),
+        )
     }
 
     /// Returns true if displacements are those of bodies under the training images by the config's
@@ -338,27 +391,42 @@ impl RunFile {
         let space = self.space();
         let mut archive = Archive::new();
         for robot in &self.elites {
-            let cell =
-                space.index(&robot.cell).expect("elites are in cells of their archive: a file's are checked");
+            let cell = space
+                .index(&robot.cell)
+                .expect("elites are in cells of their archive: a file's are checked");
             if archive.get(cell).is_some() {
-                return Err(Error::input(format!("elite {}: another one is in its cell", robot.id)));
+                return Err(Error::input(format!(
+                    "elite {}: another one is in its cell",
+                    robot.id
+                )));
             }
-            let elite = Elite { cell, objective: robot.objective, solution: robot.clone() };
-            archive.insert(elite).map_err(|error| Error::input(error.to_string()))?;
+            let elite = Elite {
+                cell,
+                objective: robot.objective,
+                solution: robot.clone(),
+            };
+            archive
+                .insert(elite)
+                .map_err(|error| Error::input(error.to_string()))?;
         }
         Ok(archive)
     }
 
     /// Encodes the file as JSON: the head on one line, then one line per elite.
     pub fn to_json(&self) -> String {
-        let head = RunFile { elites: Vec::new(), ..self.clone() };
+        let head = RunFile {
+            elites: Vec::new(),
+            ..self.clone()
+        };
         by_lines(&head, &self.elites)
     }
 
     /// Returns the identity of the run: the SHA-256 of its file's bytes, or of those to be written,
     /// in hexadecimal digits.
     pub fn fingerprint(&self) -> String {
-        self.read_sha256.clone().unwrap_or_else(|| sha256_hex(self.to_json().as_bytes()))
+        self.read_sha256
+            .clone()
+            .unwrap_or_else(|| sha256_hex(self.to_json().as_bytes()))
     }
 
     /// Encodes `elites.csv` for pyribs' `ArchiveDataFrame`. `index`: cell; `objective`;
@@ -375,14 +443,32 @@ impl RunFile {
             .chain(["id", "task", "generation"].map(str::to_string))
             .chain(table::numbered("displacement", images));
         let rows = self.elites.iter().map(|robot| {
-            let index =
-                space.index(&robot.cell).expect("elites are in cells of their archive: a file's are checked");
-            let VoxelCounts { muscle, sensor, total } = robot.voxels;
+            let index = space
+                .index(&robot.cell)
+                .expect("elites are in cells of their archive: a file's are checked");
+            let VoxelCounts {
+                muscle,
+                sensor,
+                total,
+            } = robot.voxels;
             let task = robot.cell.get(3).copied();
             let measures: Vec<usize> = [muscle, sensor, total].into_iter().chain(task).collect();
-            let solution: Vec<u8> = robot.body.voxels().cells().iter().map(|voxel| voxel.code()).collect();
+            let solution: Vec<u8> = robot
+                .body
+                .voxels()
+                .cells()
+                .iter()
+                .map(|voxel| voxel.code())
+                .collect();
             let about = (&robot.id, &robot.task, robot.generation);
-            (index, robot.objective, measures, solution, about, &robot.displacements)
+            (
+                index,
+                robot.objective,
+                measures,
+                solution,
+                about,
+                &robot.displacements,
+            )
         });
         table::csv(columns, rows)
     }
@@ -392,7 +478,9 @@ impl RunFile {
 ///
 /// # Errors
 /// Returns an error that names two equal runs.
-pub(crate) fn different<'a>(runs: impl IntoIterator<Item = (&'a Path, &'a RunFile)>) -> Result<(), Error> {
+pub(crate) fn different<'a>(
+    runs: impl IntoIterator<Item = (&'a Path, &'a RunFile)>,
+) -> Result<(), Error> {
     let mut known: Vec<(&Path, &RunFile)> = Vec::new();
     for (path, run) in runs {
         if let Some((first, other)) = known.iter().find(|(_, other)| other.is_same_run(run)) {
@@ -401,7 +489,9 @@ pub(crate) fn different<'a>(runs: impl IntoIterator<Item = (&'a Path, &'a RunFil
                 true => "these are the same",
                 false => "these are two states of one",
             };
-            return Err(Error::usage(format!("{first} and {path}: expected different runs, {these}")));
+            return Err(Error::usage(format!(
+                "{first} and {path}: expected different runs, {these}"
+            )));
         }
         known.push((path, run));
     }
@@ -416,19 +506,28 @@ mod tests {
     #[test]
     fn a_run_is_identified_by_the_bytes_of_its_file() {
         let mut run = samples::run(&[("a", 1.5), ("b", -0.25)]);
-        run.elites.iter_mut().for_each(|robot| robot.id = robot.genome.id());
+        run.elites
+            .iter_mut()
+            .for_each(|robot| robot.id = robot.genome.id());
         let text = run.to_json();
         let read = |text: &str| RunFile::parse(text, "run.json").unwrap();
         // The file has this text, so its fingerprint is known without another reading.
         assert_eq!(read(&text).fingerprint(), run.fingerprint());
         // The same content in other bytes is another file, with the hash that sha256sum computes.
-        for other in [text.replace("1.5", "1.50"), format!("{text}\n"), format!("\u{feff}{text}")] {
+        for other in [
+            text.replace("1.5", "1.50"),
+            format!("{text}\n"),
+            format!("\u{feff}{text}"),
+        ] {
             assert_ne!(other, text);
             assert_eq!(read(&other).to_json(), text);
             assert_eq!(read(&other).fingerprint(), sha256_hex(other.as_bytes()));
         }
         // But it is the same run.
-        let twice = [(Path::new("a.json"), &read(&text)), (Path::new("b.json"), &read(&format!("{text}\n")))];
+        let twice = [
+            (Path::new("a.json"), &read(&text)),
+            (Path::new("b.json"), &read(&format!("{text}\n"))),
+        ];
         assert!(different(twice).is_err());
     }
 }

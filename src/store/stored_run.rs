@@ -21,7 +21,10 @@ impl StoredRun {
     /// # Errors
     /// As [`RunFile::read`].
     pub(crate) fn read(path: &Path) -> Result<Self, Error> {
-        Ok(StoredRun { path: path.to_path_buf(), run: RunFile::read(path)? })
+        Ok(StoredRun {
+            path: path.to_path_buf(),
+            run: RunFile::read(path)?,
+        })
     }
 
     /// Checks that its robots have a task.
@@ -32,7 +35,10 @@ impl StoredRun {
         if !self.run.config.measures_response() {
             return Ok(());
         }
-        let text = format!("{}: these are gaits, which tell no images apart yet", self.path.display());
+        let text = format!(
+            "{}: these are gaits, which tell no images apart yet",
+            self.path.display()
+        );
         let train = Invocation::new("train").option("archive", folder::archive(&self.path));
         Err(Error::input(text).remedy(Remedy::Run(train.option("task", "4|9"), "trains one")))
     }

@@ -32,8 +32,13 @@ pub(crate) enum TaskState {
 
 impl TaskState {
     /// All states.
-    pub(crate) const ALL: [TaskState; 5] =
-        [TaskState::Done, TaskState::Running, TaskState::Stopped, TaskState::Failed, TaskState::Waiting];
+    pub(crate) const ALL: [TaskState; 5] = [
+        TaskState::Done,
+        TaskState::Running,
+        TaskState::Stopped,
+        TaskState::Failed,
+        TaskState::Waiting,
+    ];
 
     /// Returns the name of the state.
     pub(crate) fn name(self) -> &'static str {
@@ -104,7 +109,8 @@ impl TaskFile {
     /// # Errors
     /// Returns an error if it cannot be written.
     pub(crate) fn write(&self, path: &Path) -> Result<(), Error> {
-        let text = serde_json::to_string(self).expect("keys are text and numbers are finite") + "\n";
+        let text =
+            serde_json::to_string(self).expect("keys are text and numbers are finite") + "\n";
         write_atomically(path, text.as_bytes()).map_err(|error| Error::writing(path, &error))
     }
 }

@@ -178,7 +178,10 @@ impl Accuracy {
     pub(crate) fn check(&self, images: usize) -> Result<(), Error> {
         match self.right <= images {
             true => Ok(()),
-            false => Err(Error::at_key("right", format!("expected at most {images}, found {}", self.right))),
+            false => Err(Error::at_key(
+                "right",
+                format!("expected at most {images}, found {}", self.right),
+            )),
         }
     }
 }
@@ -188,15 +191,23 @@ impl Stored for TeamFile {
 
     fn check(&self) -> Result<(), Error> {
         let (classes, images) = (self.classes.len(), self.images.len());
-        let refuse = |key: &str, expected: String| Err(Error::at_key(key, format!("expected {expected}")));
+        let refuse =
+            |key: &str, expected: String| Err(Error::at_key(key, format!("expected {expected}")));
         let mut different = self.classes.clone();
         different.sort_unstable();
         different.dedup();
         if classes < 2 || different != self.classes {
             return refuse("classes", "two or more, each once, in order".to_string());
         }
-        if let Some(image) = self.images.iter().find(|image| !self.classes.contains(&image.label)) {
-            return refuse("images", format!("labels among the classes, found {}", image.label));
+        if let Some(image) = self
+            .images
+            .iter()
+            .find(|image| !self.classes.contains(&image.label))
+        {
+            return refuse(
+                "images",
+                format!("labels among the classes, found {}", image.label),
+            );
         }
         if !(1..=MOST_CYCLES).contains(&self.cycles) {
             return refuse("cycles", format!("1 to {MOST_CYCLES}"));
@@ -214,7 +225,10 @@ impl Stored for TeamFile {
             known.dedup();
             let all = member.groups.concat();
             if known.len() != all.len() || all.iter().any(|class| !self.classes.contains(class)) {
-                return refuse(&of("groups"), "two groups of the classes, each class once".to_string());
+                return refuse(
+                    &of("groups"),
+                    "two groups of the classes, each class once".to_string(),
+                );
             }
             if member.groups.iter().any(Vec::is_empty) {
                 return refuse(&of("groups"), "a class in each group".to_string());
@@ -223,16 +237,33 @@ impl Stored for TeamFile {
                 return refuse(&of("first_group_walks"), "left or right".to_string());
             }
             if member.displacements.len() != images {
-                return refuse(&of("displacements"), format!("one for each of {images} images"));
+                return refuse(
+                    &of("displacements"),
+                    format!("one for each of {images} images"),
+                );
             }
-            member.own.check(images).map_err(|error| error.in_place(&of("own")))?;
+            member
+                .own
+                .check(images)
+                .map_err(|error| error.in_place(&of("own")))?;
         }
-        for decoded in self.answers.iter().flat_map(|answers| [&answers.votes, &answers.walks]) {
-            decoded.accuracy.check(images).map_err(|error| error.in_place("accuracy"))?;
+        for decoded in self
+            .answers
+            .iter()
+            .flat_map(|answers| [&answers.votes, &answers.walks])
+        {
+            decoded
+                .accuracy
+                .check(images)
+                .map_err(|error| error.in_place("accuracy"))?;
             if decoded.answers.len() != images {
                 return refuse("answers", format!("one for each of {images} images"));
             }
-            if decoded.answers.iter().any(|answer| !self.classes.contains(answer)) {
+            if decoded
+                .answers
+                .iter()
+                .any(|answer| !self.classes.contains(answer))
+            {
                 return refuse("answers", "classes of the team".to_string());
             }
             if !decoded.per_class.keys().eq(&self.classes) {
@@ -242,20 +273,32 @@ impl Stored for TeamFile {
             if rows.len() != classes || rows.iter().any(|row| row.len() != classes) {
                 return refuse("confusion", format!("{classes} rows of {classes} numbers"));
             }
-            if rows.iter().flatten().fold(0, |sum: usize, count| sum.saturating_add(*count)) != images {
+            if rows
+                .iter()
+                .flatten()
+                .fold(0, |sum: usize, count| sum.saturating_add(*count))
+                != images
+            {
                 return refuse("confusion", format!("{images} images in all"));
             }
         }
         if let Some(baselines) = &self.baselines {
-            let TeamBaselines { linear_one_against_rest, linear_pairs, nearest_neighbour, best_body, .. } =
-                baselines;
+            let TeamBaselines {
+                linear_one_against_rest,
+                linear_pairs,
+                nearest_neighbour,
+                best_body,
+                ..
+            } = baselines;
             for (key, accuracy) in [
                 ("linear_one_against_rest", linear_one_against_rest),
                 ("linear_pairs", linear_pairs),
                 ("nearest_neighbour", nearest_neighbour),
                 ("best_body", best_body),
             ] {
-                accuracy.check(images).map_err(|error| error.in_place(&format!("baselines.{key}")))?;
+                accuracy
+                    .check(images)
+                    .map_err(|error| error.in_place(&format!("baselines.{key}")))?;
             }
         }
         Ok(())
@@ -288,22 +331,38 @@ impl TeamFile {
     /// # Errors
     /// Returns an error if a file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
-        let json = serde_json::to_string(self).expect("keys are text and numbers are finite") + "\n";
+        let json =
+            serde_json::to_string(self).expect("keys are text and numbers are finite") + "\n";
         let figures = FIGURES.iter().flat_map(|name| figure(path, name));
         write_with_table(path, &json, &self.to_csv(), figures)
     }
 
     /// Encodes a row per image: its class, both answers, and each robot's displacement.
     fn to_csv(&self) -> Vec<u8> {
-        let columns = ["index", "label", "by_votes", "by_walks"].map(str::to_string).into_iter();
-        let columns =
-            columns.chain(self.members.iter().map(|member| format!("{} {}", member.task, member.id)));
+        let columns = ["index", "label", "by_votes", "by_walks"]
+            .map(str::to_string)
+            .into_iter();
+        let columns = columns.chain(
+            self.members
+                .iter()
+                .map(|member| format!("{} {}", member.task, member.id)),
+        );
         let rows = self.images.iter().enumerate().map(|(place, image)| {
-            let answer =
-                |of: fn(&Answers) -> &Decoded| self.answers.as_ref().map(|all| of(all).answers[place]);
-            let walks: Vec<Option<f64>> =
-                self.members.iter().map(|member| member.displacements[place]).collect();
-            (image.index, image.label, answer(|all| &all.votes), answer(|all| &all.walks), walks)
+            let answer = |of: fn(&Answers) -> &Decoded| {
+                self.answers.as_ref().map(|all| of(all).answers[place])
+            };
+            let walks: Vec<Option<f64>> = self
+                .members
+                .iter()
+                .map(|member| member.displacements[place])
+                .collect();
+            (
+                image.index,
+                image.label,
+                answer(|all| &all.votes),
+                answer(|all| &all.walks),
+                walks,
+            )
         });
         table::csv(columns, rows)
     }

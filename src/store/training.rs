@@ -80,13 +80,26 @@ impl File {
     /// Creates the file of these rollouts, with its checksum.
     pub(crate) fn new(key: String, rollouts: Vec<Batch>) -> Self {
         let (format, format_version) = (FILE.0.to_string(), FILE.1);
-        let file = File { format, format_version, key, checksum: None, rollouts };
-        File { checksum: Some(file.sum()), ..file }
+        let file = File {
+            format,
+            format_version,
+            key,
+            checksum: None,
+            rollouts,
+        };
+        File {
+            checksum: Some(file.sum()),
+            ..file
+        }
     }
 
     fn sum(&self) -> String {
         let content = (&self.key, &self.rollouts);
-        sha256_hex(serde_json::to_string(&content).expect("texts, numbers and lists are JSON").as_bytes())
+        sha256_hex(
+            serde_json::to_string(&content)
+                .expect("texts, numbers and lists are JSON")
+                .as_bytes(),
+        )
     }
 }
 

@@ -35,7 +35,10 @@ impl Stored for Content {
     fn check(&self) -> Result<(), Error> {
         for (key, sizes) in &self.trainings {
             for (size, trained) in sizes {
-                if !trained.iter().all(|(accuracy, _)| (0.0..=1.0).contains(accuracy)) {
+                if !trained
+                    .iter()
+                    .all(|(accuracy, _)| (0.0..=1.0).contains(accuracy))
+                {
                     let text = "expected accuracies from 0 to 1";
                     return Err(Error::at_key(&format!("trainings.{key}.{size}"), text));
                 }
@@ -53,8 +56,11 @@ impl Trainings {
     /// Returns an error if the file cannot be read, because its trainings would be lost.
     pub(crate) fn read(results: &Path) -> Result<Self, Error> {
         let path = results.with_extension("trainings.json");
-        let empty =
-            || Content { format: FORMAT.0.to_string(), format_version: FORMAT.1, ..Content::default() };
+        let empty = || Content {
+            format: FORMAT.0.to_string(),
+            format_version: FORMAT.1,
+            ..Content::default()
+        };
         let anew = "move it away, and networks are trained anew";
         let content = match exists(&path) {
             true => results::read(&path, None).map_err(|error| error.advice(anew))?,
@@ -65,13 +71,20 @@ impl Trainings {
 
     /// Returns the trainings of a size: accuracy, parameters.
     pub(crate) fn of(&self, key: &str, size: usize) -> &[(f64, usize)] {
-        self.content.trainings.get(key).and_then(|sizes| sizes.get(&size)).map_or(&[], Vec::as_slice)
+        self.content
+            .trainings
+            .get(key)
+            .and_then(|sizes| sizes.get(&size))
+            .map_or(&[], Vec::as_slice)
     }
 
     /// Adds the next trainings of a size.
     pub(crate) fn extend(&mut self, key: &str, size: usize, trained: &[Trained]) {
         let sizes = self.content.trainings.entry(key.to_string()).or_default();
-        sizes.entry(size).or_default().extend(trained.iter().map(|t| (t.accuracy, t.parameters)));
+        sizes
+            .entry(size)
+            .or_default()
+            .extend(trained.iter().map(|t| (t.accuracy, t.parameters)));
     }
 
     /// Writes the trainings.
@@ -79,9 +92,11 @@ impl Trainings {
     /// # Errors
     /// Returns an error if they cannot be written.
     pub(crate) fn write(&self) -> Result<(), Error> {
-        let text =
-            serde_json::to_string(&self.content).map_err(|error| Error::other(error.to_string()))? + "\n";
-        write_atomically(&self.path, text.as_bytes()).map_err(|error| Error::writing(&self.path, &error))
+        let text = serde_json::to_string(&self.content)
+            .map_err(|error| Error::other(error.to_string()))?
+            + "\n";
+        write_atomically(&self.path, text.as_bytes())
+            .map_err(|error| Error::writing(&self.path, &error))
     }
 }
 
@@ -94,14 +109,27 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("capacity.json");
         let mut trainings = Trainings::read(&out).unwrap();
-        let trained = [0.5, 0.75].map(|accuracy| Trained { accuracy, epochs: 9, parameters: 12 });
+        let trained = [0.5, 0.75].map(|accuracy| Trained {
+            accuracy,
+            epochs: 9,
+            parameters: 12,
+        });
         trainings.extend("a", 3, &trained[..1]);
         trainings.extend("a", 3, &trained[1..]);
         trainings.write().unwrap();
         let again = Trainings::read(&out).unwrap();
         assert_eq!(again.of("a", 3), [(0.5, 12), (0.75, 12)]);
         assert!(again.of("a", 4).is_empty() && again.of("b", 3).is_empty());
-        std::fs::write(folder.path().join("capacity.trainings.json"), "{\"format\": 1").unwrap();
-        assert!(Trainings::read(&out).unwrap_err().message.contains("capacity.trainings.json"));
+        std::fs::write(
+            folder.path().join("capacity.trainings.json"),
+            "{\"format\": 1",
+        )
+        .unwrap();
+        assert!(
+            Trainings::read(&out)
+                .unwrap_err()
+                .message
+                .contains("capacity.trainings.json")
+        );
     }
 }

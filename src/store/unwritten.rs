@@ -13,12 +13,18 @@ impl Unwritten {
     ///
     /// # Errors
     /// If the folder is no longer this process's: to try again would not help.
-    pub(crate) fn tried(&mut self, outcome: Result<(), Error>, session: &Session) -> Result<(), Error> {
+    pub(crate) fn tried(
+        &mut self,
+        outcome: Result<(), Error>,
+        session: &Session,
+    ) -> Result<(), Error> {
         if matches!(&outcome, Err(error) if error.kind == ErrorKind::Lost) {
             return outcome;
         }
         if let (Err(error), None) = (&outcome, &self.0) {
-            session.observer.failed(error, "the work goes on, and it is tried again");
+            session
+                .observer
+                .failed(error, "the work goes on, and it is tried again");
         }
         self.0 = outcome.err();
         Ok(())
@@ -49,11 +55,25 @@ mod tests {
         let counting = Counting(AtomicU32::new(0));
         let mut unwritten = Unwritten::default();
         let full = || Err(Error::other("full".to_string()));
-        for (outcome, warnings) in [(Ok(()), 0), (full(), 1), (full(), 1), (Ok(()), 1), (full(), 2)] {
+        for (outcome, warnings) in [
+            (Ok(()), 0),
+            (full(), 1),
+            (full(), 1),
+            (Ok(()), 1),
+            (full(), 2),
+        ] {
             let is_full = outcome.is_err();
-            unwritten.tried(outcome, &Session::new(&NEVER, &counting)).unwrap();
-            assert_eq!((counting.0.load(Ordering::Relaxed), unwritten.0.is_some()), (warnings, is_full));
+            unwritten
+                .tried(outcome, &Session::new(&NEVER, &counting))
+                .unwrap();
+            assert_eq!(
+                (counting.0.load(Ordering::Relaxed), unwritten.0.is_some()),
+                (warnings, is_full)
+            );
         }
-        assert_eq!(unwritten.error().map(|error| error.message), Some("full".to_string()));
+        assert_eq!(
+            unwritten.error().map(|error| error.message),
+            Some("full".to_string())
+        );
     }
 }

@@ -64,7 +64,10 @@ impl Validated {
     pub(crate) fn check(&self) -> Result<(), Error> {
         match self.right <= self.images && self.images > 0 {
             true => Ok(()),
-            false => Err(Error::at_key("right", format!("expected at most images, {}", self.images))),
+            false => Err(Error::at_key(
+                "right",
+                format!("expected at most images, {}", self.images),
+            )),
         }
     }
 }
@@ -72,7 +75,9 @@ impl Validated {
 /// Checks that every robot occurs once per task, and that counts agree.
 fn check_robots(robots: &[Validated]) -> Result<(), Error> {
     for (number, robot) in robots.iter().enumerate() {
-        robot.check().map_err(|error| error.in_place(&format!("robots[{number}]")))?;
+        robot
+            .check()
+            .map_err(|error| error.in_place(&format!("robots[{number}]")))?;
         let is_it = |other: &Validated| (&other.id, &other.task) == (&robot.id, &robot.task);
         if robots[..number].iter().any(is_it) {
             let text = format!("{} is there twice for {}", robot.id, robot.task);
@@ -100,7 +105,11 @@ impl ValidationFile {
     pub(crate) fn of(&self, key: &str) -> Option<&[Validated]> {
         match self.key == key {
             true => Some(&self.robots),
-            false => self.others.iter().find(|other| other.key == key).map(|other| other.robots.as_slice()),
+            false => self
+                .others
+                .iter()
+                .find(|other| other.key == key)
+                .map(|other| other.robots.as_slice()),
         }
     }
 
@@ -114,7 +123,9 @@ impl ValidationFile {
         }
         let anew = Invocation::new("eval").option("robots", "best-validation:1");
         let remedy = Remedy::Run(anew, "chooses robots anew once the file is deleted");
-        results::read(path, None).map(Some).map_err(|error| error.remedy(remedy))
+        results::read(path, None)
+            .map(Some)
+            .map_err(|error| error.remedy(remedy))
     }
 }
 
@@ -130,9 +141,12 @@ pub(crate) fn ranking(source: &StoredRun) -> Result<Option<Vec<Validated>>, Erro
     // Earlier versions kept the latest choice, whatever it was.
     let is_own = |robots: &[Validated]| {
         let of_task = |task: &str| robots.iter().filter(|other| other.task == task).count();
-        robots.iter().all(|robot| robot.images == images && (best == 0 || of_task(&robot.task) <= best))
+        robots
+            .iter()
+            .all(|robot| robot.images == images && (best == 0 || of_task(&robot.task) <= best))
     };
-    let is_known = |file: &ValidationFile| is_of(file) && !file.robots.is_empty() && is_own(&file.robots);
+    let is_known =
+        |file: &ValidationFile| is_of(file) && !file.robots.is_empty() && is_own(&file.robots);
     Ok(file.filter(is_known).map(|file| file.robots))
 }
 
@@ -145,6 +159,10 @@ pub(crate) fn shown(source: &StoredRun) -> Result<Option<usize>, Error> {
     let Some(file) = ValidationFile::read(&source.path.with_file_name(VALIDATION_JSON))? else {
         return Ok(None);
     };
-    let all = file.others.iter().flat_map(|other| &other.robots).chain(&file.robots);
+    let all = file
+        .others
+        .iter()
+        .flat_map(|other| &other.robots)
+        .chain(&file.robots);
     Ok(all.map(|robot| robot.images).max())
 }

@@ -22,7 +22,9 @@ pub(super) fn of_split(
     split: &ClassSplit,
     answers: &[Answer],
 ) -> impl Iterator<Item = (Group, Option<f64>)> + Clone {
-    answers.iter().filter_map(|answer| Some((split.group(answer.class)?, answer.displacement)))
+    answers
+        .iter()
+        .filter_map(|answer| Some((split.group(answer.class)?, answer.displacement)))
 }
 
 /// A way to walk.
@@ -37,7 +39,11 @@ pub enum Direction {
 impl Direction {
     /// Returns a displacement's direction; `None` up to `threshold` (paper: 3 voxel lengths).
     pub fn of(displacement: f64, threshold: f64) -> Option<Self> {
-        let direction = if displacement > 0.0 { Direction::Right } else { Direction::Left };
+        let direction = if displacement > 0.0 {
+            Direction::Right
+        } else {
+            Direction::Left
+        };
         (displacement.abs() > threshold).then_some(direction)
     }
 
@@ -51,7 +57,9 @@ impl Direction {
 
     /// Returns the direction with a name.
     pub(crate) fn named(name: &str) -> Option<Self> {
-        [Direction::Left, Direction::Right].into_iter().find(|direction| direction.name() == name)
+        [Direction::Left, Direction::Right]
+            .into_iter()
+            .find(|direction| direction.name() == name)
     }
 }
 
@@ -67,7 +75,13 @@ impl Assignment {
     /// Returns the assignment under which a robot's training answers are fitter (A left in a tie).
     pub(crate) fn from_training(split: &ClassSplit, fitness: Fitness, answers: &[Answer]) -> Self {
         let (a_right, a_left) = fitness.of_assignments(of_split(split, answers));
-        Assignment { a: if a_right > a_left { Direction::Right } else { Direction::Left } }
+        Assignment {
+            a: if a_right > a_left {
+                Direction::Right
+            } else {
+                Direction::Left
+            },
+        }
     }
 
     /// Returns the direction in which a group should walk.
@@ -136,10 +150,17 @@ impl Readout {
             return None;
         }
         let walkers = |way| {
-            let group = if assignment.expected(Group::A) == way { Group::A } else { Group::B };
+            let group = if assignment.expected(Group::A) == way {
+                Group::A
+            } else {
+                Group::B
+            };
             split.classes(group).to_vec()
         };
-        Some(Readout { left: walkers(Direction::Left), right: walkers(Direction::Right) })
+        Some(Readout {
+            left: walkers(Direction::Left),
+            right: walkers(Direction::Right),
+        })
     }
 }
 
@@ -152,9 +173,17 @@ pub(crate) fn answer(readout: Option<&Readout>, moved: f64) -> Reading {
         _ => Vec::new(),
     };
     let name = |way| {
-        if way == Direction::Left { "left" } else { "right" }
+        if way == Direction::Left {
+            "left"
+        } else {
+            "right"
+        }
     };
-    Reading { moved, way: way.map(name), says }
+    Reading {
+        moved,
+        way: way.map(name),
+        says,
+    }
 }
 
 /// Returns the answer in words: "says 0", "says 1 or 2", or nothing while it names no class. With
@@ -165,14 +194,25 @@ pub(crate) fn verdict(readout: Option<&Readout>, moved: f64, class: u8, over: bo
         return String::new();
     };
     let says = answer(Some(readout), moved).says;
-    let classes = says.iter().map(u8::to_string).collect::<Vec<_>>().join(" or ");
+    let classes = says
+        .iter()
+        .map(u8::to_string)
+        .collect::<Vec<_>>()
+        .join(" or ");
     let is_known = readout.left.contains(&class) || readout.right.contains(&class);
     match (says.is_empty(), over && is_known) {
         (true, _) if over => "undecided".to_string(),
         (true, _) => String::new(),
         (false, false) => format!("says {classes}"),
         (false, true) => {
-            format!("says {classes}: {}", if says.contains(&class) { "correct" } else { "wrong" })
+            format!(
+                "says {classes}: {}",
+                if says.contains(&class) {
+                    "correct"
+                } else {
+                    "wrong"
+                }
+            )
         }
     }
 }
@@ -190,12 +230,22 @@ mod tests {
         let grouping = Grouping::two_groups(&[0], &[1]).unwrap();
         let split = &grouping.tasks()[0];
         let fixed = |displacements: [f64; 2]| {
-            let of = |class| Answer { class, displacement: Some(displacements[usize::from(class)]) };
+            let of = |class| Answer {
+                class,
+                displacement: Some(displacements[usize::from(class)]),
+            };
             Assignment::from_training(split, Fitness::Min, &[of(0), of(1)])
         };
         assert_eq!((fixed([-5.0, 8.0]).a, fixed([5.0, -8.0]).a), (Left, Right));
         // Both walk right: the shorter walk is the wrong one. No difference: left.
-        assert_eq!((fixed([8.0, 5.0]).a, fixed([5.0, 8.0]).a, fixed([5.0, 5.0]).a), (Right, Left, Left));
+        assert_eq!(
+            (
+                fixed([8.0, 5.0]).a,
+                fixed([5.0, 8.0]).a,
+                fixed([5.0, 5.0]).a
+            ),
+            (Right, Left, Left)
+        );
         let a_right = Assignment { a: Right };
         assert!(a_right.is_right(A, 3.1, 3.0) && a_right.is_right(B, -3.1, 3.0));
         assert!(!a_right.is_right(A, 3.0, 3.0) && !a_right.is_right(A, -9.0, 3.0));
@@ -205,24 +255,55 @@ mod tests {
     #[test]
     fn a_walk_names_the_group_that_was_trained_to_walk_there() {
         let grouping = Grouping::two_groups(&[0], &[1, 2]).unwrap();
-        let readout = Readout::of(&grouping.tasks()[0], Assignment { a: Direction::Right });
-        assert_eq!(readout, Some(Readout { left: vec![1, 2], right: vec![0] }));
+        let readout = Readout::of(
+            &grouping.tasks()[0],
+            Assignment {
+                a: Direction::Right,
+            },
+        );
+        assert_eq!(
+            readout,
+            Some(Readout {
+                left: vec![1, 2],
+                right: vec![0]
+            })
+        );
         let says = |moved| answer(readout.as_ref(), moved);
         assert_eq!((says(12.4).says, says(12.4).way), (vec![0], Some("right")));
-        assert_eq!((says(-3.1).says, says(-3.1).way), (vec![1, 2], Some("left")));
+        assert_eq!(
+            (says(-3.1).says, says(-3.1).way),
+            (vec![1, 2], Some("left"))
+        );
         assert_eq!((says(3.0).says, says(-3.0).way), (vec![], None));
-        assert_eq!((answer(None, -8.0).says, answer(None, -8.0).way), (vec![], Some("left")));
+        assert_eq!(
+            (answer(None, -8.0).says, answer(None, -8.0).way),
+            (vec![], Some("left"))
+        );
         let words = |moved, class, over| verdict(readout.as_ref(), moved, class, over);
         assert_eq!(
-            [words(5.0, 0, false), words(5.0, 0, true), words(5.0, 1, true)],
+            [
+                words(5.0, 0, false),
+                words(5.0, 0, true),
+                words(5.0, 1, true)
+            ],
             ["says 0", "says 0: correct", "says 0: wrong"]
         );
-        assert_eq!([words(-5.0, 2, true), words(-5.0, 7, true)], ["says 1 or 2: correct", "says 1 or 2"]);
         assert_eq!(
-            [words(2.0, 0, false), words(2.0, 0, true), verdict(None, 9.0, 0, true)],
+            [words(-5.0, 2, true), words(-5.0, 7, true)],
+            ["says 1 or 2: correct", "says 1 or 2"]
+        );
+        assert_eq!(
+            [
+                words(2.0, 0, false),
+                words(2.0, 0, true),
+                verdict(None, 9.0, 0, true)
+            ],
             ["", "undecided", ""]
         );
         let all = Grouping::all_splits(&[0, 1], true).unwrap();
-        assert_eq!(Readout::of(&all.tasks()[1], Assignment { a: Direction::Left }), None);
+        assert_eq!(
+            Readout::of(&all.tasks()[1], Assignment { a: Direction::Left }),
+            None
+        );
     }
 }

@@ -86,7 +86,9 @@ impl Fitness {
         if self == Fitness::Min {
             let nothing = (f64::INFINITY, f64::INFINITY);
             let known = margins.filter_map(|(_, m)| m);
-            return known.fold(nothing, |(right, left), m| (smaller(right, m), smaller(left, -m)));
+            return known.fold(nothing, |(right, left), m| {
+                (smaller(right, m), smaller(left, -m))
+            });
         }
         let (images, weights) = weights(margins.clone());
         let all = images[0] + images[1];
@@ -94,7 +96,10 @@ impl Fitness {
             return (f64::INFINITY, f64::INFINITY);
         }
         let mut to_come = images;
-        margins.clone().filter(|(_, m)| m.is_some()).for_each(|(group, _)| to_come[group] -= 1);
+        margins
+            .clone()
+            .filter(|(_, m)| m.is_some())
+            .for_each(|(group, _)| to_come[group] -= 1);
         // Missing answers count as perfect.
         let best = weights[0] * to_come[0] as f64 + weights[1] * to_come[1] as f64;
         let mut sums = [best; 2];
@@ -120,10 +125,13 @@ const OFFSET_COST: f64 = 0.125;
 
 /// Returns the response of the known pairs of displacements; `None` if no condition has two.
 pub(crate) fn response_so_far(displacements: impl Iterator<Item = Option<f64>>) -> Option<f64> {
-    let known: Vec<f64> = displacements.map_while(|displacement| displacement).collect();
+    let known: Vec<f64> = displacements
+        .map_while(|displacement| displacement)
+        .collect();
     let pairs = known.chunks_exact(2);
-    let (odd, even): (Vec<f64>, Vec<f64>) =
-        pairs.map(|pair| ((pair[0] - pair[1]) / 2.0, (pair[0] + pair[1]) / 2.0)).unzip();
+    let (odd, even): (Vec<f64>, Vec<f64>) = pairs
+        .map(|pair| ((pair[0] - pair[1]) / 2.0, (pair[0] + pair[1]) / 2.0))
+        .unzip();
     let conditions = CONDITIONS_OF_RESPONSE;
     let (mut squares, mut free) = (0.0, 0_usize);
     for turn in 0..conditions {
@@ -134,7 +142,9 @@ pub(crate) fn response_so_far(displacements: impl Iterator<Item = Option<f64>>) 
         };
         let count = within().count();
         let mean = within().map(|even| even - first).sum::<f64>() / count as f64;
-        squares += within().map(|even| (even - first - mean) * (even - first - mean)).sum::<f64>();
+        squares += within()
+            .map(|even| (even - first - mean) * (even - first - mean))
+            .sum::<f64>();
         free += count - 1;
     }
     let pairs = odd.len() as f64;
@@ -158,17 +168,29 @@ fn response(displacements: impl Iterator<Item = Option<f64>> + Clone) -> f64 {
 pub(super) fn margins(
     answers: impl Iterator<Item = (Group, Option<f64>)> + Clone,
 ) -> impl Iterator<Item = (usize, Option<f64>)> + Clone {
-    answers.map(|(group, d)| if group == Group::A { (0, d) } else { (1, d.map(|d| -d)) })
+    answers.map(|(group, d)| {
+        if group == Group::A {
+            (0, d)
+        } else {
+            (1, d.map(|d| -d))
+        }
+    })
 }
 
 /// Returns the number of images of each group, and the weight of one of them: exactly 1 if both
 /// have as many, or one has none.
-pub(super) fn weights(margins: impl Iterator<Item = (usize, Option<f64>)>) -> ([usize; 2], [f64; 2]) {
+pub(super) fn weights(
+    margins: impl Iterator<Item = (usize, Option<f64>)>,
+) -> ([usize; 2], [f64; 2]) {
     let mut images = [0; 2];
     margins.for_each(|(group, _)| images[group] += 1);
     let all = images[0] + images[1];
     let weight = |of_group: usize| {
-        if images.contains(&0) { 1.0 } else { all as f64 / (2 * of_group) as f64 }
+        if images.contains(&0) {
+            1.0
+        } else {
+            all as f64 / (2 * of_group) as f64
+        }
     };
     (images, images.map(weight))
 }
@@ -207,8 +229,11 @@ mod tests {
     #[test]
     fn a_response_is_what_moves_the_two_of_a_pair_apart_within_conditions_that_take_turns() {
         let response = |d: &[f64]| {
-            let answers: Vec<(Group, f64)> =
-                d.iter().zip([A, B, B].iter().cycle()).map(|(&d, &g)| (g, d)).collect();
+            let answers: Vec<(Group, f64)> = d
+                .iter()
+                .zip([A, B, B].iter().cycle())
+                .map(|(&d, &g)| (g, d))
+                .collect();
             fitness(Fitness::Response, &answers)
         };
         // Half differences 3, 2, −1, −2; half sums 0, 0, 10 and 10, 5 on average.
@@ -217,18 +242,33 @@ mod tests {
         // The direction does not matter; the distance walked anyway costs; differences between
         // conditions add nothing.
         assert_eq!(response(&pairs.map(|d| -d)), 4.5_f64.sqrt() - 5.0 / 8.0);
-        assert_eq!(response(&[3.0, -3.0, 2.0, -2.0, -1.0, 1.0, -2.0, 2.0]), 4.5_f64.sqrt());
-        assert_eq!(response(&[13.0, 7.0, -8.0, -12.0, 9.0, 11.0, -12.0, -8.0]), 4.5_f64.sqrt());
+        assert_eq!(
+            response(&[3.0, -3.0, 2.0, -2.0, -1.0, 1.0, -2.0, 2.0]),
+            4.5_f64.sqrt()
+        );
+        assert_eq!(
+            response(&[13.0, 7.0, -8.0, -12.0, 9.0, 11.0, -12.0, -8.0]),
+            4.5_f64.sqrt()
+        );
         // A displacement common to both of a pair is no response.
-        assert_eq!(response(&[2.0, 2.0, 0.0, 0.0, -2.0, -2.0, 0.0, 0.0]), -(4.0_f64).sqrt());
+        assert_eq!(
+            response(&[2.0, 2.0, 0.0, 0.0, -2.0, -2.0, 0.0, 0.0]),
+            -(4.0_f64).sqrt()
+        );
         // Rounding: ten times 0.1 is not 1 in binary.
         assert!((response(&[0.1; 20]) + 0.0125).abs() < 1e-12 && response(&[0.0; 20]) == 0.0);
         assert!(response(&[1.0, 2.0, 1.0, 2.0, f64::NAN, 2.0]).is_nan());
         // Too few pairs, and none.
-        assert_eq!((response(&[1.0, 9.0]), response(&[1.0]), response(&[])), (0.0, 0.0, f64::INFINITY));
+        assert_eq!(
+            (response(&[1.0, 9.0]), response(&[1.0]), response(&[])),
+            (0.0, 0.0, f64::INFINITY)
+        );
         // A missing answer may have any value.
         let some = [(A, Some(1.0)), (B, None), (A, Some(1.0)), (B, Some(1.0))];
-        assert_eq!(better(Fitness::Response.of_assignments(some.iter().copied())), f64::INFINITY);
+        assert_eq!(
+            better(Fitness::Response.of_assignments(some.iter().copied())),
+            f64::INFINITY
+        );
         assert_eq!(Fitness::Response.unit(), Some("voxel lengths"));
     }
 
@@ -238,7 +278,10 @@ mod tests {
         let same_way = [(A, 20.0), (B, 20.0), (B, 20.0), (B, 20.0)];
         assert!(fitness(Fitness::MeanClipped, &same_way).abs() < 1e-12);
         // All of A, and two of three of B: 1/2 + 1/2 · 1/3.
-        let most = fitness(Fitness::MeanClipped, &[(A, 20.0), (B, -20.0), (B, -20.0), (B, 20.0)]);
+        let most = fitness(
+            Fitness::MeanClipped,
+            &[(A, 20.0), (B, -20.0), (B, -20.0), (B, 20.0)],
+        );
         assert!((most - 2.0 / 3.0).abs() < 1e-12, "{most}");
     }
 

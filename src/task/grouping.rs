@@ -29,7 +29,9 @@ impl ClassSplit {
 
     /// Returns the group of a class, `None` if it belongs to neither.
     pub(crate) fn group(&self, class: u8) -> Option<Group> {
-        [Group::A, Group::B].into_iter().find(|g| self.classes(*g).contains(&class))
+        [Group::A, Group::B]
+            .into_iter()
+            .find(|g| self.classes(*g).contains(&class))
     }
 
     /// Returns true if every class is in one group: no recognition task, but the bin of robots that
@@ -65,7 +67,15 @@ pub(crate) fn groups_text(groups: [&[u8]; 2], between: &str) -> String {
 }
 
 fn joined(groups: [&[u8]; 2], between: &str, separator: &str) -> String {
-    groups.map(|group| group.iter().map(u8::to_string).collect::<Vec<_>>().join(separator)).join(between)
+    groups
+        .map(|group| {
+            group
+                .iter()
+                .map(u8::to_string)
+                .collect::<Vec<_>>()
+                .join(separator)
+        })
+        .join(between)
 }
 
 /// Two groups of classes named by the user, such as `4|9`, `0|123` or `10,11|3`.
@@ -98,7 +108,9 @@ impl Groups {
             return Ok(());
         };
         let [a, b] = &self.classes;
-        let lone = |place: usize| numbers[place].map_or(self.classes[place].clone(), |number| vec![number]);
+        let lone = |place: usize| {
+            numbers[place].map_or(self.classes[place].clone(), |number| vec![number])
+        };
         Err(Ambiguous {
             text: self.to_string(),
             class,
@@ -122,7 +134,10 @@ pub(crate) struct Ambiguous {
 
 impl From<[Vec<u8>; 2]> for Groups {
     fn from(classes: [Vec<u8>; 2]) -> Self {
-        Groups { classes, are_digits: false }
+        Groups {
+            classes,
+            are_digits: false,
+        }
     }
 }
 
@@ -136,12 +151,16 @@ impl fmt::Display for Groups {
 impl FromStr for Groups {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
-        let expected = || format!("{text}: expected two groups of classes, as in 4|9, 0|123 or 10,11|3");
+        let expected =
+            || format!("{text}: expected two groups of classes, as in 4|9, 0|123 or 10,11|3");
         let are_digits = !text.contains(',');
         let group = |part: &str| -> Option<Vec<u8>> {
             let part = part.trim();
             match are_digits {
-                true => part.chars().map(|c| u8::try_from(c.to_digit(10)?).ok()).collect(),
+                true => part
+                    .chars()
+                    .map(|c| u8::try_from(c.to_digit(10)?).ok())
+                    .collect(),
                 false => {
                     let part = part.strip_suffix(',').unwrap_or(part);
                     let number = |class: &str| class.trim().parse().ok();
@@ -150,12 +169,19 @@ impl FromStr for Groups {
             }
         };
         let (a, b) = text.split_once('|').ok_or_else(expected)?;
-        let classes = [group(a).ok_or_else(expected)?, group(b).ok_or_else(expected)?];
+        let classes = [
+            group(a).ok_or_else(expected)?,
+            group(b).ok_or_else(expected)?,
+        ];
         if classes.iter().any(Vec::is_empty) {
             return Err(expected());
         }
-        Grouping::two_groups(&classes[0], &classes[1]).map_err(|error| format!("{text}: {error}"))?;
-        Ok(Groups { classes, are_digits })
+        Grouping::two_groups(&classes[0], &classes[1])
+            .map_err(|error| format!("{text}: {error}"))?;
+        Ok(Groups {
+            classes,
+            are_digits,
+        })
     }
 }
 
@@ -169,7 +195,11 @@ pub(crate) fn balanced<'a>(
     let of_first = labels.clone().filter(|label| is_first(*label)).count();
     let of_other = labels.clone().count() - of_first;
     let way = move |label| {
-        if is_first(label) { (1.0, 0.5 / of_first as f64) } else { (-1.0, 0.5 / of_other as f64) }
+        if is_first(label) {
+            (1.0, 0.5 / of_first as f64)
+        } else {
+            (-1.0, 0.5 / of_other as f64)
+        }
     };
     labels.map(way)
 }
@@ -209,8 +239,14 @@ impl Grouping {
             return Err(GroupingError::EmptyGroup);
         }
         check_unique(&[a, b].concat())?;
-        let tasks = vec![ClassSplit { a: a.to_vec(), b: b.to_vec() }];
-        Ok(Grouping { tasks, fitness: Fitness::Min })
+        let tasks = vec![ClassSplit {
+            a: a.to_vec(),
+            b: b.to_vec(),
+        }];
+        Ok(Grouping {
+            tasks,
+            fitness: Fitness::Min,
+        })
     }
 
     /// Makes all ways to split the classes in two non-empty groups, 2^(k−1) − 1 for k classes.
@@ -234,11 +270,20 @@ impl Grouping {
         let split = |first: Vec<usize>| {
             let (a, b) = (0..k).partition::<Vec<_>, _>(|i| first.contains(i));
             let labels = |group: Vec<usize>| group.into_iter().map(|i| classes[i]).collect();
-            ClassSplit { a: labels(a), b: labels(b) }
+            ClassSplit {
+                a: labels(a),
+                b: labels(b),
+            }
         };
-        let same_way = same_way_bin.then(|| ClassSplit { a: classes.to_vec(), b: Vec::new() });
+        let same_way = same_way_bin.then(|| ClassSplit {
+            a: classes.to_vec(),
+            b: Vec::new(),
+        });
         let tasks = firsts.into_iter().map(split).chain(same_way).collect();
-        Ok(Grouping { tasks, fitness: Fitness::Min })
+        Ok(Grouping {
+            tasks,
+            fitness: Fitness::Min,
+        })
     }
 
     /// Replaces the fitness, which is the smallest margin by default.
@@ -271,7 +316,10 @@ impl Grouping {
 }
 
 fn check_unique(classes: &[u8]) -> Result<(), GroupingError> {
-    let repeated = classes.iter().enumerate().find(|(i, class)| classes[..*i].contains(class));
+    let repeated = classes
+        .iter()
+        .enumerate()
+        .find(|(i, class)| classes[..*i].contains(class));
     repeated.map_or(Ok(()), |(_, class)| Err(GroupingError::Repeated(*class)))
 }
 
@@ -325,8 +373,14 @@ mod tests {
         for text in ["1|26,", "1,|26", " 1 , | 26 , "] {
             assert_eq!(read(text), Ok([vec![1], vec![26]]), "{text}");
         }
-        assert_eq!(read("10,11|23"), Ok([vec![10, 11], vec![23]]), "a comma separates in both groups");
-        for text in ["", "1", "1|", "|1", ",|1", "1|,", "1,,2|3", "1|256,", "1|1", "1|-2,", "1|2|3", "a|b"] {
+        assert_eq!(
+            read("10,11|23"),
+            Ok([vec![10, 11], vec![23]]),
+            "a comma separates in both groups"
+        );
+        for text in [
+            "", "1", "1|", "|1", ",|1", "1|,", "1,,2|3", "1|256,", "1|1", "1|-2,", "1|2|3", "a|b",
+        ] {
             assert!(read(text).is_err(), "{text}");
         }
     }
@@ -335,7 +389,10 @@ mod tests {
     fn digits_that_may_be_a_class_of_the_data_are_said_to_be_ambiguous() {
         let said = |text: &str, there: &[u8]| {
             let groups: Groups = text.parse().unwrap();
-            groups.check_among(there).err().map(|error| error.to_string())
+            groups
+                .check_among(there)
+                .err()
+                .map(|error| error.to_string())
         };
         let letters: Vec<u8> = (1..=26).collect();
         assert_eq!(
@@ -343,7 +400,10 @@ mod tests {
             "groups 1|26: the data have a class 26; expected \"1|26,\" for it, or \"1|2,6\" for its digits"
         );
         let found = said("12|34", &letters).unwrap();
-        assert!(found.contains("expected \"12|3,4\" for it, or \"1,2|3,4\" for its digits"), "{found}");
+        assert!(
+            found.contains("expected \"12|3,4\" for it, or \"1,2|3,4\" for its digits"),
+            "{found}"
+        );
         for text in ["1|26,", "1|2,6", "4|9", "1|34"] {
             assert_eq!(said(text, &letters), None, "{text}");
         }
@@ -370,13 +430,17 @@ mod tests {
 
     #[test]
     fn four_classes_have_the_papers_seven_tasks() {
-        let paper = ["0|123", "1|023", "2|013", "3|012", "01|23", "02|13", "03|12"];
+        let paper = [
+            "0|123", "1|023", "2|013", "3|012", "01|23", "02|13", "03|12",
+        ];
         let splits = Grouping::all_splits(&[0, 1, 2, 3], false).unwrap();
         assert_eq!(names(&splits), paper);
         let with_bin = Grouping::all_splits(&[0, 1, 2, 3], true).unwrap();
         assert_eq!(names(&with_bin)[..7], paper);
         assert_eq!(names(&with_bin)[7], "same way");
-        assert!(with_bin.has_same_way_bin() && !splits.has_same_way_bin() && splits.has_all_splits());
+        assert!(
+            with_bin.has_same_way_bin() && !splits.has_same_way_bin() && splits.has_all_splits()
+        );
     }
 
     #[test]
@@ -397,17 +461,38 @@ mod tests {
         let grouping = Grouping::two_groups(&[4, 9], &[1]).unwrap();
         let split = &grouping.tasks()[0];
         let groups = [4, 9, 1, 0].map(|class| split.group(class));
-        assert_eq!(groups, [Some(Group::A), Some(Group::A), Some(Group::B), None]);
-        assert_eq!((grouping.tasks().len(), grouping.has_all_splits()), (1, false));
+        assert_eq!(
+            groups,
+            [Some(Group::A), Some(Group::A), Some(Group::B), None]
+        );
+        assert_eq!(
+            (grouping.tasks().len(), grouping.has_all_splits()),
+            (1, false)
+        );
         assert_eq!(split.name(), "49|1");
     }
 
     #[test]
     fn groupings_that_ask_nothing_are_refused() {
-        assert_eq!(Grouping::two_groups(&[0], &[]), Err(GroupingError::EmptyGroup));
-        assert_eq!(Grouping::two_groups(&[0, 1], &[1]), Err(GroupingError::Repeated(1)));
-        assert_eq!(Grouping::all_splits(&[2, 2], true), Err(GroupingError::Repeated(2)));
-        assert_eq!(Grouping::all_splits(&[2], true), Err(GroupingError::Classes(1)));
-        assert_eq!(Grouping::all_splits(&[0; 11], true), Err(GroupingError::Classes(11)));
+        assert_eq!(
+            Grouping::two_groups(&[0], &[]),
+            Err(GroupingError::EmptyGroup)
+        );
+        assert_eq!(
+            Grouping::two_groups(&[0, 1], &[1]),
+            Err(GroupingError::Repeated(1))
+        );
+        assert_eq!(
+            Grouping::all_splits(&[2, 2], true),
+            Err(GroupingError::Repeated(2))
+        );
+        assert_eq!(
+            Grouping::all_splits(&[2], true),
+            Err(GroupingError::Classes(1))
+        );
+        assert_eq!(
+            Grouping::all_splits(&[0; 11], true),
+            Err(GroupingError::Classes(11))
+        );
     }
 }

@@ -34,7 +34,12 @@ enum Written {
 impl Margins {
     /// Makes equal margins at every edge.
     pub(crate) fn same(margin: usize) -> Self {
-        Margins { top: margin, right: margin, bottom: margin, left: margin }
+        Margins {
+            top: margin,
+            right: margin,
+            bottom: margin,
+            left: margin,
+        }
     }
 
     /// Returns true if nothing is left out.
@@ -44,15 +49,21 @@ impl Margins {
 
     /// Returns the height and width that remain of an image of this size; `None` if nothing does.
     pub(crate) fn left_of(&self, [height, width]: [usize; 2]) -> Option<[usize; 2]> {
-        let left =
-            |side: usize, a: usize, b: usize| side.checked_sub(a.checked_add(b)?).filter(|left| *left > 0);
-        Some([left(height, self.top, self.bottom)?, left(width, self.left, self.right)?])
+        let left = |side: usize, a: usize, b: usize| {
+            side.checked_sub(a.checked_add(b)?).filter(|left| *left > 0)
+        };
+        Some([
+            left(height, self.top, self.bottom)?,
+            left(width, self.left, self.right)?,
+        ])
     }
 
     /// Returns the part that remains of an image; `None` if nothing does.
     pub(crate) fn cut<T: Clone>(&self, image: &Grid<T>) -> Option<Grid<T>> {
         let [rows, columns] = self.left_of([image.height(), image.width()])?;
-        Some(Grid::from_fn(rows, columns, |r, c| image[(r + self.top, c + self.left)].clone()))
+        Some(Grid::from_fn(rows, columns, |r, c| {
+            image[(r + self.top, c + self.left)].clone()
+        }))
     }
 
     /// Returns the smaller margin at each edge, so that the remaining part contains those of both.
@@ -109,8 +120,8 @@ impl<'de> Visitor<'de> for Reader {
     }
 
     fn visit_u64<E: Error>(self, margin: u64) -> Result<Margins, E> {
-        let pixels =
-            usize::try_from(margin).map_err(|_| E::invalid_value(Unexpected::Unsigned(margin), &self))?;
+        let pixels = usize::try_from(margin)
+            .map_err(|_| E::invalid_value(Unexpected::Unsigned(margin), &self))?;
         Ok(Margins::same(pixels))
     }
 
@@ -124,13 +135,20 @@ impl<'de> Visitor<'de> for Reader {
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Margins, A::Error> {
         let mut margins = [0; 4];
         for (place, margin) in margins.iter_mut().enumerate() {
-            *margin = list.next_element()?.ok_or_else(|| A::Error::invalid_length(place, &self))?;
+            *margin = list
+                .next_element()?
+                .ok_or_else(|| A::Error::invalid_length(place, &self))?;
         }
         if list.next_element::<usize>()?.is_some() {
             return Err(A::Error::invalid_length(margins.len() + 1, &self));
         }
         let [top, right, bottom, left] = margins;
-        Ok(Margins { top, right, bottom, left })
+        Ok(Margins {
+            top,
+            right,
+            bottom,
+            left,
+        })
     }
 }
 
@@ -140,20 +158,45 @@ mod tests {
 
     #[test]
     fn they_are_written_as_one_number_or_as_four() {
-        let uneven = Margins { top: 1, right: 2, bottom: 3, left: 4 };
-        for (margins, text) in [(Margins::same(5), "5"), (Margins::default(), "0"), (uneven, "[1,2,3,4]")] {
+        let uneven = Margins {
+            top: 1,
+            right: 2,
+            bottom: 3,
+            left: 4,
+        };
+        for (margins, text) in [
+            (Margins::same(5), "5"),
+            (Margins::default(), "0"),
+            (uneven, "[1,2,3,4]"),
+        ] {
             assert_eq!(serde_json::to_string(&margins).unwrap(), text);
             assert_eq!(serde_json::from_str::<Margins>(text).unwrap(), margins);
         }
-        assert_eq!(serde_json::from_str::<Margins>("[3, 3, 3, 3]").unwrap(), Margins::same(3));
+        assert_eq!(
+            serde_json::from_str::<Margins>("[3, 3, 3, 3]").unwrap(),
+            Margins::same(3)
+        );
         assert_eq!(uneven.to_string(), "[1, 2, 3, 4]");
     }
 
     #[test]
     fn anything_else_is_refused_by_what_was_expected() {
-        for text in ["-1", "1.5", "\"4\"", "[1, 2, 3]", "[1, 2, 3, 4, 5]", "[]", "{\"top\": 1}"] {
-            let error = serde_json::from_str::<Margins>(text).unwrap_err().to_string();
-            assert!(error.contains("a number of pixels, or [top, right, bottom, left]"), "{text}: {error}");
+        for text in [
+            "-1",
+            "1.5",
+            "\"4\"",
+            "[1, 2, 3]",
+            "[1, 2, 3, 4, 5]",
+            "[]",
+            "{\"top\": 1}",
+        ] {
+            let error = serde_json::from_str::<Margins>(text)
+                .unwrap_err()
+                .to_string();
+            assert!(
+                error.contains("a number of pixels, or [top, right, bottom, left]"),
+                "{text}: {error}"
+            );
         }
         assert!(serde_json::from_str::<Margins>("[1, 2, -3, 4]").is_err());
     }
@@ -161,17 +204,57 @@ mod tests {
     #[test]
     fn what_is_left_is_what_lies_between_them_or_nothing() {
         let image = Grid::from_fn(5, 7, |r, c| 10 * r + c);
-        let left = Margins { top: 1, right: 3, bottom: 2, left: 2 }.cut(&image).unwrap();
-        assert_eq!((left.height(), left.width(), left[(0, 0)], left[(1, 1)]), (2, 2, 12, 23));
-        for margins in [[3, 0, 2, 0], [0, 4, 0, 3], [usize::MAX, 0, 1, 0], [0, 9, 0, 0]] {
+        let left = Margins {
+            top: 1,
+            right: 3,
+            bottom: 2,
+            left: 2,
+        }
+        .cut(&image)
+        .unwrap();
+        assert_eq!(
+            (left.height(), left.width(), left[(0, 0)], left[(1, 1)]),
+            (2, 2, 12, 23)
+        );
+        for margins in [
+            [3, 0, 2, 0],
+            [0, 4, 0, 3],
+            [usize::MAX, 0, 1, 0],
+            [0, 9, 0, 0],
+        ] {
             let [top, right, bottom, left] = margins;
-            assert_eq!(Margins { top, right, bottom, left }.cut(&image), None);
+            assert_eq!(
+                Margins {
+                    top,
+                    right,
+                    bottom,
+                    left
+                }
+                .cut(&image),
+                None
+            );
         }
     }
 
     #[test]
     fn the_least_of_two_holds_both() {
-        let [a, b] = [Margins { top: 1, right: 5, bottom: 3, left: 0 }, Margins::same(2)];
-        assert_eq!(a.least(&b), Margins { top: 1, right: 2, bottom: 2, left: 0 });
+        let [a, b] = [
+            Margins {
+                top: 1,
+                right: 5,
+                bottom: 3,
+                left: 0,
+            },
+            Margins::same(2),
+        ];
+        assert_eq!(
+            a.least(&b),
+            Margins {
+                top: 1,
+                right: 2,
+                bottom: 2,
+                left: 0
+            }
+        );
     }
 }

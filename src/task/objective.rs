@@ -48,7 +48,12 @@ pub(crate) trait Objective: Sync {
 pub(crate) struct Recognition;
 
 impl Objective for Recognition {
-    fn prepare(&self, stimuli: Vec<Grid<f64>>, _: &Physics, _: u64) -> (Vec<Grid<f64>>, Vec<Condition>) {
+    fn prepare(
+        &self,
+        stimuli: Vec<Grid<f64>>,
+        _: &Physics,
+        _: u64,
+    ) -> (Vec<Grid<f64>>, Vec<Condition>) {
         (stimuli, Vec::new())
     }
 

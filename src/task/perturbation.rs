@@ -15,7 +15,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The kind of a change.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum PerturbationKind {
     /// The robot starts above the ground, and first touches it in another way; also in another
@@ -101,7 +103,14 @@ pub(crate) struct Sizes {
 
 impl Default for Sizes {
     fn default() -> Self {
-        Sizes { start: vec![1, 2], time_step: vec![2, 4], share: 0.05, pixels: 3, least_sensors: 10, seed: 1 }
+        Sizes {
+            start: vec![1, 2],
+            time_step: vec![2, 4],
+            share: 0.05,
+            pixels: 3,
+            least_sensors: 10,
+            seed: 1,
+        }
     }
 }
 
@@ -130,7 +139,10 @@ pub(crate) struct ByTurns {
 
 impl Default for ByTurns {
     fn default() -> Self {
-        ByTurns { start: 2, length_limits: true }
+        ByTurns {
+            start: 2,
+            length_limits: true,
+        }
     }
 }
 
@@ -140,8 +152,13 @@ pub(crate) type Condition = Vec<Perturbation>;
 impl ByTurns {
     /// Returns every condition once: starts raised by 0 up to the most rows, then without limits.
     pub(crate) fn conditions(&self) -> impl Iterator<Item = Condition> {
-        let ByTurns { start, length_limits } = *self;
-        let one = move |without_limits: bool| (0..=start).map(move |rows| condition(rows, without_limits));
+        let ByTurns {
+            start,
+            length_limits,
+        } = *self;
+        let one = move |without_limits: bool| {
+            (0..=start).map(move |rows| condition(rows, without_limits))
+        };
         one(false).chain(length_limits.then(|| one(true)).into_iter().flatten())
     }
 
@@ -152,7 +169,10 @@ impl ByTurns {
         let condition = |class: u8| {
             let turn = turns[usize::from(class)];
             turns[usize::from(class)] += 1;
-            condition((turn % starts) as u32, self.length_limits && (turn / starts) % 2 == 1)
+            condition(
+                (turn % starts) as u32,
+                self.length_limits && (turn / starts) % 2 == 1,
+            )
         };
         classes.map(condition).collect()
     }
@@ -171,7 +191,10 @@ pub(crate) fn of_response() -> [Condition; CONDITIONS_OF_RESPONSE] {
 /// Returns the condition of a start raised by this number of rows, with or without length limits.
 pub(crate) fn condition(rows: u32, without_limits: bool) -> Condition {
     let start = (rows > 0).then_some(Perturbation::Start { rows });
-    start.into_iter().chain(without_limits.then_some(Perturbation::NoLengthLimits)).collect()
+    start
+        .into_iter()
+        .chain(without_limits.then_some(Perturbation::NoLengthLimits))
+        .collect()
 }
 
 /// One change of a simulation.
@@ -256,7 +279,11 @@ impl From<Perturbation> for Stored {
             | Perturbation::SelfContact
             | Perturbation::Order => (0.5, 0),
         };
-        Stored { kind: perturbation.kind(), amount, seed }
+        Stored {
+            kind: perturbation.kind(),
+            amount,
+            seed,
+        }
     }
 }
 
@@ -267,7 +294,10 @@ impl TryFrom<Stored> for Perturbation {
         let is_whole = amount.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&amount);
         let whole = || match is_whole {
             true => Ok(amount as u32),
-            false => Err(format!("amount {amount}: expected a whole number of {}", kind.name())),
+            false => Err(format!(
+                "amount {amount}: expected a whole number of {}",
+                kind.name()
+            )),
         };
         Ok(match kind {
             PerturbationKind::Start => Perturbation::Start { rows: whole()? },
@@ -280,7 +310,10 @@ impl TryFrom<Stored> for Perturbation {
             PerturbationKind::Stiffness => Perturbation::Stiffness { factor: amount },
             PerturbationKind::Friction => Perturbation::Friction { factor: amount },
             PerturbationKind::Gravity => Perturbation::Gravity { factor: amount },
-            PerturbationKind::Pixel => Perturbation::Pixel { draw: whole()?, seed },
+            PerturbationKind::Pixel => Perturbation::Pixel {
+                draw: whole()?,
+                seed,
+            },
         })
     }
 }
@@ -292,30 +325,39 @@ impl Perturbation {
         let factors = [1.0 - sizes.share, 1.0 + sizes.share];
         let of = |kind| -> Vec<Self> {
             match kind {
-                PerturbationKind::Start => {
-                    sizes.start.iter().map(|&rows| Perturbation::Start { rows }).collect()
-                }
+                PerturbationKind::Start => sizes
+                    .start
+                    .iter()
+                    .map(|&rows| Perturbation::Start { rows })
+                    .collect(),
                 PerturbationKind::Mirror => vec![Perturbation::Mirror],
-                PerturbationKind::TimeStep => {
-                    sizes.time_step.iter().map(|&divisor| Perturbation::TimeStep { divisor }).collect()
-                }
+                PerturbationKind::TimeStep => sizes
+                    .time_step
+                    .iter()
+                    .map(|&divisor| Perturbation::TimeStep { divisor })
+                    .collect(),
                 PerturbationKind::LengthLimits => {
                     vec![Perturbation::SlowLengthLimits, Perturbation::NoLengthLimits]
                 }
                 PerturbationKind::SelfContact => vec![Perturbation::SelfContact],
                 PerturbationKind::Order if rollout == RolloutMode::Fresh => Vec::new(),
                 PerturbationKind::Order => vec![Perturbation::Order],
-                PerturbationKind::Stiffness => {
-                    factors.map(|factor| Perturbation::Stiffness { factor }).to_vec()
-                }
-                PerturbationKind::Friction => {
-                    factors.map(|factor| Perturbation::Friction { factor }).to_vec()
-                }
-                PerturbationKind::Gravity => factors.map(|factor| Perturbation::Gravity { factor }).to_vec(),
+                PerturbationKind::Stiffness => factors
+                    .map(|factor| Perturbation::Stiffness { factor })
+                    .to_vec(),
+                PerturbationKind::Friction => factors
+                    .map(|factor| Perturbation::Friction { factor })
+                    .to_vec(),
+                PerturbationKind::Gravity => factors
+                    .map(|factor| Perturbation::Gravity { factor })
+                    .to_vec(),
                 PerturbationKind::Pixel if !sees => Vec::new(),
-                PerturbationKind::Pixel => {
-                    (1..=sizes.pixels).map(|draw| Perturbation::Pixel { draw, seed: sizes.seed }).collect()
-                }
+                PerturbationKind::Pixel => (1..=sizes.pixels)
+                    .map(|draw| Perturbation::Pixel {
+                        draw,
+                        seed: sizes.seed,
+                    })
+                    .collect(),
             }
         };
         PerturbationKind::ALL.into_iter().flat_map(of).collect()
@@ -327,7 +369,9 @@ impl Perturbation {
             Perturbation::Start { .. } => PerturbationKind::Start,
             Perturbation::Mirror => PerturbationKind::Mirror,
             Perturbation::TimeStep { .. } => PerturbationKind::TimeStep,
-            Perturbation::SlowLengthLimits | Perturbation::NoLengthLimits => PerturbationKind::LengthLimits,
+            Perturbation::SlowLengthLimits | Perturbation::NoLengthLimits => {
+                PerturbationKind::LengthLimits
+            }
             Perturbation::SelfContact => PerturbationKind::SelfContact,
             Perturbation::Order => PerturbationKind::Order,
             Perturbation::Stiffness { .. } => PerturbationKind::Stiffness,
@@ -352,7 +396,10 @@ impl Perturbation {
             | Perturbation::Friction { factor }
             | Perturbation::Gravity { factor } => {
                 let change = number::signed(100.0 * (factor - 1.0), 3);
-                format!("{kind} {} %", change.strip_suffix(".000").unwrap_or(&change))
+                format!(
+                    "{kind} {} %",
+                    change.strip_suffix(".000").unwrap_or(&change)
+                )
             }
             Perturbation::Pixel { draw, .. } => format!("{kind} {draw}"),
         }
@@ -367,7 +414,12 @@ impl Perturbation {
     /// Returns the changed setting. Compare displacements under it only after
     /// [`Perturbation::undo`].
     pub(crate) fn apply(&self, setting: &PerturbedSetting) -> PerturbedSetting {
-        let PerturbedSetting { body, physics, protocol, stimuli } = setting;
+        let PerturbedSetting {
+            body,
+            physics,
+            protocol,
+            stimuli,
+        } = setting;
         let stimulus = |(image, stimulus)| self.stimulus(body, stimulus, image as u64);
         let mut stimuli: Vec<Grid<f64>> = stimuli.iter().enumerate().map(stimulus).collect();
         if *self == Perturbation::Order {
@@ -383,7 +435,11 @@ impl Perturbation {
 
     /// Returns the changed body.
     pub(crate) fn body(&self, body: &Body) -> Body {
-        if *self == Perturbation::Mirror { body.mirrored() } else { body.clone() }
+        if *self == Perturbation::Mirror {
+            body.mirrored()
+        } else {
+            body.clone()
+        }
     }
 
     /// Returns the changed constants of the simulator.
@@ -392,16 +448,19 @@ impl Perturbation {
             Perturbation::TimeStep { divisor } => physics.refined(divisor),
             Perturbation::NoLengthLimits => physics.without_limits(),
             Perturbation::SlowLengthLimits => physics.with_slower_limits(2.0),
-            Perturbation::SelfContact => {
-                Physics { self_contact_weight: physics.self_contact_weight * 0.5, ..physics.clone() }
-            }
+            Perturbation::SelfContact => Physics {
+                self_contact_weight: physics.self_contact_weight * 0.5,
+                ..physics.clone()
+            },
             Perturbation::Stiffness { factor } => physics.with_stiffness(factor),
-            Perturbation::Friction { factor } => {
-                Physics { friction: physics.friction * factor, ..physics.clone() }
-            }
-            Perturbation::Gravity { factor } => {
-                Physics { gravity: physics.gravity * factor, ..physics.clone() }
-            }
+            Perturbation::Friction { factor } => Physics {
+                friction: physics.friction * factor,
+                ..physics.clone()
+            },
+            Perturbation::Gravity { factor } => Physics {
+                gravity: physics.gravity * factor,
+                ..physics.clone()
+            },
             Perturbation::Start { .. }
             | Perturbation::Mirror
             | Perturbation::Order
@@ -425,7 +484,9 @@ impl Perturbation {
     pub(crate) fn stimulus(&self, body: &Body, stimulus: &Grid<f64>, image: u64) -> Grid<f64> {
         match *self {
             Perturbation::Mirror => stimulus.mirrored(),
-            Perturbation::Pixel { draw, seed } => with_pixel_inverted(body, stimulus, (seed, draw, image)),
+            Perturbation::Pixel { draw, seed } => {
+                with_pixel_inverted(body, stimulus, (seed, draw, image))
+            }
             _ => stimulus.clone(),
         }
     }
@@ -443,14 +504,26 @@ impl Perturbation {
 }
 
 /// Inverts a pixel under a sensor, drawn by the seed, the number of the draw and that of the image.
-fn with_pixel_inverted(body: &Body, stimulus: &Grid<f64>, (seed, draw, image): (u64, u32, u64)) -> Grid<f64> {
-    let sensors: Vec<_> =
-        body.voxels().iter().filter(|(_, m)| m.is_sensor()).map(|(place, _)| place).collect();
+fn with_pixel_inverted(
+    body: &Body,
+    stimulus: &Grid<f64>,
+    (seed, draw, image): (u64, u32, u64),
+) -> Grid<f64> {
+    let sensors: Vec<_> = body
+        .voxels()
+        .iter()
+        .filter(|(_, m)| m.is_sensor())
+        .map(|(place, _)| place)
+        .collect();
     let mut random = stream(seed, Purpose::AuditPixels, u64::from(draw), image);
     let chosen = random.choose(&sensors).copied();
     let pixel = |row, column| {
         let pixel = stimulus[(row, column)];
-        if chosen == Some((row, column)) { 1.0 - pixel } else { pixel }
+        if chosen == Some((row, column)) {
+            1.0 - pixel
+        } else {
+            pixel
+        }
     };
     Grid::from_fn(stimulus.height(), stimulus.width(), pixel)
 }
@@ -462,11 +535,19 @@ mod tests {
     fn setting() -> PerturbedSetting {
         let stimuli = vec![Grid::filled(2, 4, 0.25), Grid::filled(2, 4, 1.0)];
         let body = "3516/4442".parse().unwrap();
-        PerturbedSetting { body, physics: Physics::default(), protocol: Protocol::default(), stimuli }
+        PerturbedSetting {
+            body,
+            physics: Physics::default(),
+            protocol: Protocol::default(),
+            stimuli,
+        }
     }
 
     fn all(rollout: RolloutMode) -> Vec<Perturbation> {
-        let sizes = Sizes { least_sensors: 2, ..Sizes::default() };
+        let sizes = Sizes {
+            least_sensors: 2,
+            ..Sizes::default()
+        };
         Perturbation::all(&sizes, &setting().body, rollout)
     }
 
@@ -500,13 +581,26 @@ mod tests {
             changed.physics.validate().unwrap();
         }
         assert_eq!(of(PerturbationKind::Start)[1].protocol.start_row, 4);
-        assert_eq!(of(PerturbationKind::Gravity)[0].physics.gravity, 110.0 * 0.95);
+        assert_eq!(
+            of(PerturbationKind::Gravity)[0].physics.gravity,
+            110.0 * 0.95
+        );
         assert_eq!(of(PerturbationKind::TimeStep)[1].physics.substeps, 120);
-        let [slow, far] =
-            [&of(PerturbationKind::LengthLimits)[0].physics, &of(PerturbationKind::LengthLimits)[1].physics];
+        let [slow, far] = [
+            &of(PerturbationKind::LengthLimits)[0].physics,
+            &of(PerturbationKind::LengthLimits)[1].physics,
+        ];
         assert!((0.55..0.56).contains(&slow.limit_share) && far.limit_share == 0.8);
-        assert_eq!((far.limit_low, far.limit_high, slow.limit_low), (0.6, 1.6, 0.75));
-        assert_eq!(of(PerturbationKind::SelfContact)[0].physics.self_contact_weight, 1.0);
+        assert_eq!(
+            (far.limit_low, far.limit_high, slow.limit_low),
+            (0.6, 1.6, 0.75)
+        );
+        assert_eq!(
+            of(PerturbationKind::SelfContact)[0]
+                .physics
+                .self_contact_weight,
+            1.0
+        );
     }
 
     #[test]
@@ -525,7 +619,10 @@ mod tests {
         // With two sensors one pixel is more than noise.
         let few = Perturbation::all(&Sizes::default(), &setting().body, RolloutMode::Fresh);
         assert!(few.iter().all(|p| p.kind() != PerturbationKind::Pixel));
-        let blind = PerturbedSetting { body: "33/44".parse().unwrap(), ..setting() };
+        let blind = PerturbedSetting {
+            body: "33/44".parse().unwrap(),
+            ..setting()
+        };
         let pixel = Perturbation::Pixel { draw: 1, seed: 1 };
         assert_eq!(pixel.apply(&blind), blind);
     }
@@ -533,41 +630,84 @@ mod tests {
     #[test]
     fn starts_are_raised_and_limits_removed_by_turns_within_each_class() {
         let conditions = |classes: &[u8], start: u32, length_limits: bool| {
-            ByTurns { start, length_limits }.of(classes.iter().copied())
+            ByTurns {
+                start,
+                length_limits,
+            }
+            .of(classes.iter().copied())
         };
         let of = |turns: &[(u32, bool)]| -> Vec<Condition> {
-            turns.iter().map(|(rows, without)| condition(*rows, *without)).collect()
+            turns
+                .iter()
+                .map(|(rows, without)| condition(*rows, *without))
+                .collect()
         };
         let (with, without) = (false, true);
         let raised = [0, 0, 1, 1, 2, 2, 0, 0].map(|rows| (rows, with));
         assert_eq!(conditions(&[0, 1, 0, 1, 0, 1, 0, 7], 2, false), of(&raised));
-        assert_eq!(conditions(&[0, 0], u32::MAX, true), of(&[(0, with), (1, with)]));
+        assert_eq!(
+            conditions(&[0, 0], u32::MAX, true),
+            of(&[(0, with), (1, with)])
+        );
         let limits = [with, with, without, without, with].map(|w| (0, w));
         assert_eq!(conditions(&[4, 5, 4, 5, 4], 0, true), of(&limits));
         let every = [(0, with), (1, with), (0, without), (1, without)];
         assert_eq!(conditions(&[3; 4], 1, true), of(&every));
-        assert_eq!(ByTurns { start: 1, length_limits: true }.conditions().collect::<Vec<_>>(), of(&every));
-        assert_eq!(ByTurns { start: 2, length_limits: false }.conditions().count(), 3);
+        assert_eq!(
+            ByTurns {
+                start: 1,
+                length_limits: true
+            }
+            .conditions()
+            .collect::<Vec<_>>(),
+            of(&every)
+        );
+        assert_eq!(
+            ByTurns {
+                start: 2,
+                length_limits: false
+            }
+            .conditions()
+            .count(),
+            3
+        );
         let json = serde_json::to_string(&condition(1, true)).unwrap();
-        assert_eq!(json, r#"[{"kind":"start","amount":1.0},{"kind":"length_limits","amount":0.0}]"#);
+        assert_eq!(
+            json,
+            r#"[{"kind":"start","amount":1.0},{"kind":"length_limits","amount":0.0}]"#
+        );
         for perturbation in all(RolloutMode::Sequential) {
             let json = serde_json::to_string(&perturbation).unwrap();
-            assert_eq!(serde_json::from_str::<Perturbation>(&json).unwrap(), perturbation);
+            assert_eq!(
+                serde_json::from_str::<Perturbation>(&json).unwrap(),
+                perturbation
+            );
         }
-        let half = serde_json::from_str::<Perturbation>(r#"{"kind":"start","amount":0.5}"#).unwrap_err();
-        assert!(half.to_string().contains("amount 0.5: expected a whole number"), "{half}");
+        let half =
+            serde_json::from_str::<Perturbation>(r#"{"kind":"start","amount":0.5}"#).unwrap_err();
+        assert!(
+            half.to_string()
+                .contains("amount 0.5: expected a whole number"),
+            "{half}"
+        );
     }
 
     #[test]
     fn names_are_distinct_and_a_mirror_image_walks_the_other_way() {
         let all = all(RolloutMode::Sequential);
         let mut names: Vec<String> = all.iter().map(Perturbation::name).collect();
-        assert!(names.contains(&"time step / 4".to_string()) && names.contains(&"gravity -5 %".to_string()));
+        assert!(
+            names.contains(&"time step / 4".to_string())
+                && names.contains(&"gravity -5 %".to_string())
+        );
         names.sort();
         names.dedup();
         assert_eq!(names.len(), all.len());
-        let excused: Vec<String> =
-            all.iter().filter(|p| !p.counts_if_unstable()).map(Perturbation::name).collect();
+        let excused: Vec<String> = all
+            .iter()
+            .filter(|p| !p.counts_if_unstable())
+            .map(Perturbation::name)
+            .collect();
         assert_eq!(excused, ["length limits beyond all goals"]);
         for perturbation in all {
             let expected = match perturbation.kind() {
@@ -579,6 +719,9 @@ mod tests {
         }
         // Fresh rollouts have no order.
         let fresh = super::tests::all(RolloutMode::Fresh);
-        assert!(fresh.iter().all(|p| p.kind() != PerturbationKind::Order) && fresh.len() + 1 == names.len());
+        assert!(
+            fresh.iter().all(|p| p.kind() != PerturbationKind::Order)
+                && fresh.len() + 1 == names.len()
+        );
     }
 }

@@ -39,6 +39,11 @@ pub struct Protocol {
 
 impl Default for Protocol {
     fn default() -> Self {
-        Protocol { rollout: RolloutMode::Fresh, control_steps: 500, start_row: 2, start_column: 493 }
+        Protocol {
+            rollout: RolloutMode::Fresh,
+            control_steps: 500,
+            start_row: 2,
+            start_column: 493,
+        }
     }
 }

@@ -25,9 +25,16 @@ pub struct Rollout<'a> {
 impl<'a> Rollout<'a> {
     /// Makes a robot at its start.
     pub fn new(system: &Arc<System>, protocol: &'a Protocol) -> Self {
-        let start = Start { column: protocol.start_column, row: protocol.start_row };
+        let start = Start {
+            column: protocol.start_column,
+            row: protocol.start_row,
+        };
         let world = World::new(Arc::clone(system), start);
-        Rollout { begin: world.centre_of_mass()[0], world, protocol }
+        Rollout {
+            begin: world.centre_of_mass()[0],
+            world,
+            protocol,
+        }
     }
 
     fn physics(&self) -> &Physics {
@@ -40,7 +47,11 @@ impl<'a> Rollout<'a> {
     ///
     /// # Errors
     /// Returns [`Unstable`] if the rollout ends.
-    pub fn show(&mut self, stimulus: &Grid<f64>, mut watch: impl FnMut(&World)) -> Result<f64, Unstable> {
+    pub fn show(
+        &mut self,
+        stimulus: &Grid<f64>,
+        mut watch: impl FnMut(&World),
+    ) -> Result<f64, Unstable> {
         self.look_at(stimulus);
         for _ in 0..self.protocol.control_steps {
             self.step()?;
@@ -53,7 +64,11 @@ impl<'a> Rollout<'a> {
     ///
     /// # Errors
     /// Returns a [`StepError`] if it was stopped, or if the rollout became unstable.
-    pub(crate) fn show_unless(&mut self, stimulus: &Grid<f64>, stop: &AtomicBool) -> Result<f64, StepError> {
+    pub(crate) fn show_unless(
+        &mut self,
+        stimulus: &Grid<f64>,
+        stop: &AtomicBool,
+    ) -> Result<f64, StepError> {
         self.look_at(stimulus);
         for _ in 0..self.protocol.control_steps {
             self.step_unless(stop)?;
@@ -92,13 +107,25 @@ impl<'a> Rollout<'a> {
     pub(crate) fn frame(&self) -> Frame {
         let physics = self.physics();
         let ground = f64::from(physics.ground_row) * physics.cell_size;
-        let place = |[x, y]: [f64; 2]| [voxel_lengths(x, physics), voxel_lengths(y - ground, physics)];
-        Frame { points: self.world.points().map(place).collect(), centre: place(self.world.centre_of_mass()) }
+        let place = |[x, y]: [f64; 2]| {
+            [
+                voxel_lengths(x, physics),
+                voxel_lengths(y - ground, physics),
+            ]
+        };
+        Frame {
+            points: self.world.points().map(place).collect(),
+            centre: place(self.world.centre_of_mass()),
+        }
     }
 
     /// Returns the voxels with their corners, as indices into a [`Rollout::frame`]'s points.
     pub(crate) fn voxels(&self) -> Vec<VoxelCorners> {
-        let corner = |((row, column), corners)| VoxelCorners { row, column, corners };
+        let corner = |((row, column), corners)| VoxelCorners {
+            row,
+            column,
+            corners,
+        };
         self.world.voxels().map(corner).collect()
     }
 
@@ -134,18 +161,29 @@ pub fn fresh_rollouts_of(
     stop: &AtomicBool,
 ) -> Result<Vec<Result<f64, Unstable>>, Stopped> {
     if let [one] = stimuli {
-        return Ok(vec![StepError::outcome(fresh_rollout(system, protocol, one, stop))?]);
+        return Ok(vec![StepError::outcome(fresh_rollout(
+            system, protocol, one, stop,
+        ))?]);
     }
-    let start = Start { column: protocol.start_column, row: protocol.start_row };
+    let start = Start {
+        column: protocol.start_column,
+        row: protocol.start_row,
+    };
     let mut worlds = Worlds::new(Arc::clone(system), start, stimuli.len());
-    stimuli.iter().enumerate().for_each(|(number, stimulus)| worlds.set_stimulus(number, stimulus));
+    stimuli
+        .iter()
+        .enumerate()
+        .for_each(|(number, stimulus)| worlds.set_stimulus(number, stimulus));
     let begin = worlds.all()[0].centre_of_mass()[0];
     for _ in 0..protocol.control_steps {
         worlds.step_unless(stop)?;
     }
     let moved = |(world, ended): (&World, &Option<Unstable>)| match ended {
         Some(unstable) => Err(*unstable),
-        None => Ok(voxel_lengths(world.centre_of_mass()[0] - begin, system.physics())),
+        None => Ok(voxel_lengths(
+            world.centre_of_mass()[0] - begin,
+            system.physics(),
+        )),
     };
     Ok(worlds.all().iter().zip(worlds.ended()).map(moved).collect())
 }
@@ -179,12 +217,23 @@ pub(crate) fn walk(
 /// Returns for each stimulus the index of the first one that gives the body's sensors the same
 /// pixels: those share a rollout.
 pub(crate) fn same_to_sensors(body: &Body, stimuli: &[&Grid<f64>]) -> Vec<usize> {
-    let sensors = || body.voxels().iter().filter(|(_, m)| m.is_sensor()).map(|(place, _)| place);
+    let sensors = || {
+        body.voxels()
+            .iter()
+            .filter(|(_, m)| m.is_sensor())
+            .map(|(place, _)| place)
+    };
     let mut first = std::collections::HashMap::new();
     let seen = |stimulus: &Grid<f64>| {
-        sensors().map(|place| stimulus.or_default(place).to_bits()).collect::<Vec<u64>>()
+        sensors()
+            .map(|place| stimulus.or_default(place).to_bits())
+            .collect::<Vec<u64>>()
     };
-    stimuli.iter().enumerate().map(|(i, stimulus)| *first.entry(seen(stimulus)).or_insert(i)).collect()
+    stimuli
+        .iter()
+        .enumerate()
+        .map(|(i, stimulus)| *first.entry(seen(stimulus)).or_insert(i))
+        .collect()
 }
 
 /// Records a robot's rollout frame by frame for pictures, with one phase for each image and no
@@ -226,7 +275,11 @@ pub fn record(
             displacement = rollout.moved();
             recording.frames.push(rollout.frame());
         }
-        recording.phases.push(Phase { first_frame, seen: seen.clone(), displacement });
+        recording.phases.push(Phase {
+            first_frame,
+            seen: seen.clone(),
+            displacement,
+        });
         if unstable {
             recording.unstable = true;
             break;
@@ -243,7 +296,11 @@ mod tests {
     const STEPS: u32 = 12;
 
     fn protocol() -> Protocol {
-        Protocol { rollout: RolloutMode::Fresh, control_steps: STEPS, ..Protocol::default() }
+        Protocol {
+            rollout: RolloutMode::Fresh,
+            control_steps: STEPS,
+            ..Protocol::default()
+        }
     }
 
     fn body() -> Body {
@@ -256,7 +313,11 @@ mod tests {
 
     /// Makes an image of one brightness except for a pixel over the empty middle.
     fn image(brightness: f64, middle: f64) -> Grid<f64> {
-        Grid::from_fn(3, 4, |r, c| if (r, c) == (1, 1) { middle } else { brightness })
+        Grid::from_fn(
+            3,
+            4,
+            |r, c| if (r, c) == (1, 1) { middle } else { brightness },
+        )
     }
 
     #[test]
@@ -265,19 +326,32 @@ mod tests {
         let mut rollout = Rollout::new(&system, &protocol);
         let mut way = Vec::new();
         let start = rollout.world.centre_of_mass()[0];
-        let first = rollout.show(&image(1.0, 0.0), |world| way.push(world.centre_of_mass()[0])).unwrap();
+        let first = rollout
+            .show(&image(1.0, 0.0), |world| {
+                way.push(world.centre_of_mass()[0])
+            })
+            .unwrap();
         assert_eq!(way.len(), STEPS as usize);
         assert!((first - 10.0 * (way[STEPS as usize - 1] - start)).abs() < 1e-12 && first != 0.0);
         // The rollout continues from there; after a reset, from the beginning.
         assert_ne!(rollout.show(&image(1.0, 0.0), |_| ()).unwrap(), first);
         rollout.reset();
         assert_eq!(rollout.show(&image(1.0, 0.0), |_| ()).unwrap(), first);
-        assert_eq!(fresh_rollout(&system, &protocol, &image(1.0, 0.0), &NEVER), Ok(first));
+        assert_eq!(
+            fresh_rollout(&system, &protocol, &image(1.0, 0.0), &NEVER),
+            Ok(first)
+        );
     }
 
     #[test]
     fn images_are_the_same_to_sensors_if_they_differ_elsewhere_only() {
-        let images = [image(0.0, 0.0), image(0.5, 0.0), image(0.0, 1.0), image(0.5, 0.7), image(0.25, 0.0)];
+        let images = [
+            image(0.0, 0.0),
+            image(0.5, 0.0),
+            image(0.0, 1.0),
+            image(0.5, 0.7),
+            image(0.25, 0.0),
+        ];
         let views: Vec<&Grid<f64>> = images.iter().collect();
         assert_eq!(same_to_sensors(&body(), &views), [0, 1, 0, 1, 4]);
         let blind: Body = "4113/4001/3301".parse().unwrap();
@@ -295,14 +369,26 @@ mod tests {
         let (system, protocol) = (system(), protocol());
         let stop = AtomicBool::new(true);
         let image = image(1.0, 0.0);
-        assert_eq!(fresh_rollout(&system, &protocol, &image, &stop), Err(Stopped.into()));
-        assert_eq!(walk(&system, &protocol, &[image], false, &stop), Err(Stopped.into()));
+        assert_eq!(
+            fresh_rollout(&system, &protocol, &image, &stop),
+            Err(Stopped.into())
+        );
+        assert_eq!(
+            walk(&system, &protocol, &[image], false, &stop),
+            Err(Stopped.into())
+        );
     }
 
     fn recorded(fresh: bool, physics: &Physics) -> Recording {
-        let seen =
-            |class, label: &str, stimulus| LabelledStimulus { class, label: label.to_string(), stimulus };
-        let images = [seen(0, "dark", image(0.0, 0.0)), seen(1, "bright", image(1.0, 0.0))];
+        let seen = |class, label: &str, stimulus| LabelledStimulus {
+            class,
+            label: label.to_string(),
+            stimulus,
+        };
+        let images = [
+            seen(0, "dark", image(0.0, 0.0)),
+            seen(1, "bright", image(1.0, 0.0)),
+        ];
         record("r", &body(), physics, &protocol(), fresh, &images)
     }
 
@@ -312,18 +398,32 @@ mod tests {
         let recording = recorded(false, &physics);
         let steps = STEPS as usize;
         assert_eq!(recording.frames.len(), 1 + 2 * steps);
-        let begin: Vec<usize> = recording.phases.iter().map(|phase| phase.first_frame).collect();
+        let begin: Vec<usize> = recording
+            .phases
+            .iter()
+            .map(|phase| phase.first_frame)
+            .collect();
         assert_eq!((begin, recording.unstable), (vec![0, steps], false));
         assert_eq!(recording.phases[1].seen.label, "bright");
         assert_eq!((recording.voxels.len(), recording.cycle), (9, 50));
         for (phase, end) in recording.phases.iter().zip([steps, 2 * steps]) {
-            let way = recording.frames[end].centre[0] - recording.frames[phase.first_frame].centre[0];
-            assert!((phase.displacement - way).abs() < 1e-9, "{} {way}", phase.displacement);
+            let way =
+                recording.frames[end].centre[0] - recording.frames[phase.first_frame].centre[0];
+            assert!(
+                (phase.displacement - way).abs() < 1e-9,
+                "{} {way}",
+                phase.displacement
+            );
         }
         // y starts at the ground, under the robot; x at its left edge; a voxel is 1.
         let points = &recording.frames[0].points;
         let least = |axis: usize| points.iter().map(|p| p[axis]).fold(f64::INFINITY, f64::min);
-        assert!(least(0).abs() < 1e-9 && least(1).abs() < 1e-9, "{} {}", least(0), least(1));
+        assert!(
+            least(0).abs() < 1e-9 && least(1).abs() < 1e-9,
+            "{} {}",
+            least(0),
+            least(1)
+        );
         let [top_left, _, bottom_right, _] = recording.voxels[0].corners;
         let side = points[bottom_right][0] - points[top_left][0];
         assert!((side - 1.0).abs() < 1e-9 && points[top_left][1] > points[bottom_right][1]);
@@ -347,11 +447,20 @@ mod tests {
         let (physics, system) = (Physics::default(), system());
         let images = [image(0.0, 0.0), image(1.0, 0.0)];
         for rollout in [RolloutMode::Fresh, RolloutMode::Sequential] {
-            let protocol = Protocol { rollout, ..protocol() };
+            let protocol = Protocol {
+                rollout,
+                ..protocol()
+            };
             let walk = |measured| walk(&system, &protocol, &images, measured, &NEVER);
             let [(plain, nothing), (measured, energy)] = [false, true].map(|m| walk(m).unwrap());
             let recorded = recorded(rollout == RolloutMode::Fresh, &physics).phases;
-            assert_eq!(plain, recorded.iter().map(|phase| phase.displacement).collect::<Vec<_>>());
+            assert_eq!(
+                plain,
+                recorded
+                    .iter()
+                    .map(|phase| phase.displacement)
+                    .collect::<Vec<_>>()
+            );
             assert_eq!((plain, nothing), (measured, Energy::default()));
             assert!(energy.drive > 0.0, "{energy:?}");
         }
@@ -359,10 +468,17 @@ mod tests {
 
     #[test]
     fn an_unstable_rollout_is_recorded_up_to_its_end() {
-        let physics = Physics { blow_up_extent: 0.12, ..Physics::default() };
+        let physics = Physics {
+            blow_up_extent: 0.12,
+            ..Physics::default()
+        };
         let recording = recorded(true, &physics);
         assert!(recording.unstable && recording.phases.len() == 1);
-        assert!((1..=STEPS as usize).contains(&recording.frames.len()), "{}", recording.frames.len());
+        assert!(
+            (1..=STEPS as usize).contains(&recording.frames.len()),
+            "{}",
+            recording.frames.len()
+        );
         assert!(recording.phases[0].displacement.is_finite());
     }
 }

@@ -40,7 +40,10 @@ impl Grouping {
     /// |d|, and the signs determine the task. A robot that walks the same way for all classes goes
     /// to that bin with min |d| if there is one, else to its best split, with a negative fitness.
     pub(crate) fn score(&self, answers: &[Answer]) -> Score {
-        let mut best = Score { task: 0, fitness: f64::NEG_INFINITY };
+        let mut best = Score {
+            task: 0,
+            fitness: f64::NEG_INFINITY,
+        };
         for (task, split) in self.tasks().iter().enumerate() {
             let fitness = self.fitness_on(split, answers);
             if fitness > best.fitness || fitness.is_nan() {
@@ -53,7 +56,11 @@ impl Grouping {
     /// Returns true if a robot may still enter the archive, given only the displacements known so
     /// far: some task may be its own, with a fitness above `incumbent(task)` (`None`: the cell is
     /// empty). Lossless: if this is false, no further answers get the robot in.
-    pub fn can_still_win(&self, answers: &[Answer], incumbent: impl Fn(usize) -> Option<f64>) -> bool {
+    pub fn can_still_win(
+        &self,
+        answers: &[Answer],
+        incumbent: impl Fn(usize) -> Option<f64>,
+    ) -> bool {
         let wins = |task, fitness| incumbent(task).is_none_or(|i| fitness > i);
         if answers.iter().all(|answer| answer.displacement.is_some()) {
             let Score { task, fitness } = self.score(answers);
@@ -100,13 +107,17 @@ impl Grouping {
         let images = classes.len();
         classes.sort_unstable();
         classes.dedup();
-        let asked = answers.iter().filter(|a| self.tasks().iter().any(|s| s.group(a.class).is_some()));
+        let asked = answers
+            .iter()
+            .filter(|a| self.tasks().iter().any(|s| s.group(a.class).is_some()));
         let (mut left, mut right) = (false, false);
         asked.filter_map(|a| a.displacement).for_each(|d| {
             left |= d <= 0.0;
             right |= d >= 0.0;
         });
-        self.has_all_splits() && classes.len() == images && (self.has_same_way_bin() || left && right)
+        self.has_all_splits()
+            && classes.len() == images
+            && (self.has_same_way_bin() || left && right)
     }
 }
 
@@ -131,7 +142,14 @@ mod tests {
     }
 
     fn answers(displacements: &[f64]) -> Vec<Answer> {
-        displacements.iter().zip(0..).map(|(&d, class)| Answer { class, displacement: Some(d) }).collect()
+        displacements
+            .iter()
+            .zip(0..)
+            .map(|(&d, class)| Answer {
+                class,
+                displacement: Some(d),
+            })
+            .collect()
     }
 
     fn digits(same_way_bin: bool) -> Grouping {
@@ -155,7 +173,11 @@ mod tests {
 
     #[test]
     fn standing_still_scores_0_and_never_minus_0() {
-        for stand in [[(A, 0.0), (B, 2.0)], [(A, -0.0), (B, -2.0)], [(A, 0.0), (B, -0.0)]] {
+        for stand in [
+            [(A, 0.0), (B, 2.0)],
+            [(A, -0.0), (B, -2.0)],
+            [(A, 0.0), (B, -0.0)],
+        ] {
             assert_eq!(two_group_fitness(&stand).to_bits(), 0.0f64.to_bits());
         }
     }
@@ -164,30 +186,59 @@ mod tests {
     fn an_answer_that_is_not_a_number_is_not_overlooked() {
         assert!(two_group_fitness(&[(A, f64::NAN), (B, 2.0)]).is_nan());
         assert!(two_group_fitness(&[(A, 1.0), (B, f64::NAN), (A, 0.0)]).is_nan());
-        assert!(digits(true).score(&answers(&[1.0, f64::NAN])).fitness.is_nan());
+        assert!(
+            digits(true)
+                .score(&answers(&[1.0, f64::NAN]))
+                .fitness
+                .is_nan()
+        );
     }
 
     #[test]
     fn signs_say_which_task_four_answers_perform() {
         let splits = digits(false);
-        assert_eq!(named(&splits, &[-4.0, 5.0, 6.0, 7.0]), ("0|123".into(), 4.0));
-        assert_eq!(named(&splits, &[4.0, -5.0, -3.0, 7.0]), ("03|12".into(), 3.0));
-        assert_eq!(named(&splits, &[4.0, 5.0, 6.0, -2.0]), ("3|012".into(), 2.0));
+        assert_eq!(
+            named(&splits, &[-4.0, 5.0, 6.0, 7.0]),
+            ("0|123".into(), 4.0)
+        );
+        assert_eq!(
+            named(&splits, &[4.0, -5.0, -3.0, 7.0]),
+            ("03|12".into(), 3.0)
+        );
+        assert_eq!(
+            named(&splits, &[4.0, 5.0, 6.0, -2.0]),
+            ("3|012".into(), 2.0)
+        );
     }
 
     #[test]
     fn all_the_same_way_is_a_bin_of_its_own_or_the_least_failure() {
-        assert_eq!(named(&digits(true), &[4.0, 5.0, 3.0, 7.0]), ("same way".into(), 3.0));
-        assert_eq!(named(&digits(false), &[4.0, 5.0, 3.0, 7.0]), ("2|013".into(), -3.0));
-        assert_eq!(named(&digits(false), &[-4.0, -4.0, -5.0, -7.0]), ("0|123".into(), -4.0));
+        assert_eq!(
+            named(&digits(true), &[4.0, 5.0, 3.0, 7.0]),
+            ("same way".into(), 3.0)
+        );
+        assert_eq!(
+            named(&digits(false), &[4.0, 5.0, 3.0, 7.0]),
+            ("2|013".into(), -3.0)
+        );
+        assert_eq!(
+            named(&digits(false), &[-4.0, -4.0, -5.0, -7.0]),
+            ("0|123".into(), -4.0)
+        );
     }
 
     #[test]
     fn a_robot_stops_when_no_task_it_can_perform_is_open_to_it() {
         // 0 left and 1 right: only splits of these remain; 0|123 is empty, 01|23 out of reach.
         let shown = |classes: &[u8]| {
-            let to_come = classes.iter().map(|&class| Answer { class, displacement: None });
-            answers(&[-5.0, 6.0]).into_iter().chain(to_come).collect::<Vec<_>>()
+            let to_come = classes.iter().map(|&class| Answer {
+                class,
+                displacement: None,
+            });
+            answers(&[-5.0, 6.0])
+                .into_iter()
+                .chain(to_come)
+                .collect::<Vec<_>>()
         };
         let taken_but = |free: usize| move |task: usize| (task != free).then_some(5.0);
         assert!(digits(false).can_still_win(&shown(&[2, 3]), taken_but(0)));
@@ -197,7 +248,10 @@ mod tests {
         // A lone task is every robot's own, failed or not; only strictly fitter ones enter.
         let lone = Grouping::two_groups(&[0, 1], &[2]).unwrap();
         let against = |incumbent| lone.can_still_win(&shown(&[2]), |_| incumbent);
-        assert_eq!([None, Some(-5.1), Some(-5.0)].map(against), [true, true, false]);
+        assert_eq!(
+            [None, Some(-5.1), Some(-5.0)].map(against),
+            [true, true, false]
+        );
         // Nothing is known: everything is possible.
         assert!(digits(false).can_still_win(&shown(&[2, 3])[2..], |_| Some(1e9)));
     }
@@ -205,13 +259,30 @@ mod tests {
     #[test]
     fn the_hardest_images_of_both_groups_come_first_by_turns() {
         // 0 left, 1 right; 2 is in neither group.
-        let lone = Grouping::two_groups(&[0], &[1]).unwrap().with_fitness(Fitness::MeanClipped);
-        let answer = |(class, d)| Answer { class, displacement: Some(d) };
-        let answers =
-            [(0, -8.0), (0, -1.0), (1, 9.0), (1, -2.0), (2, 1.0), (0, -4.0), (0, -9.0), (1, 7.0)].map(answer);
+        let lone = Grouping::two_groups(&[0], &[1])
+            .unwrap()
+            .with_fitness(Fitness::MeanClipped);
+        let answer = |(class, d)| Answer {
+            class,
+            displacement: Some(d),
+        };
+        let answers = [
+            (0, -8.0),
+            (0, -1.0),
+            (1, 9.0),
+            (1, -2.0),
+            (2, 1.0),
+            (0, -4.0),
+            (0, -9.0),
+            (1, 7.0),
+        ]
+        .map(answer);
         assert_eq!(lone.hardest_first(&answers), [3, 1, 5, 7, 0, 2, 6]);
         assert_eq!(
-            lone.hardest_first(&answers.map(|a| Answer { displacement: a.displacement.map(|d| -d), ..a })),
+            lone.hardest_first(&answers.map(|a| Answer {
+                displacement: a.displacement.map(|d| -d),
+                ..a
+            })),
             [3, 1, 5, 7, 0, 2, 6]
         );
         assert!(lone.hardest_first(&[]).is_empty());

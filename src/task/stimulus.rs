@@ -67,7 +67,11 @@ impl StimulusParams {
     pub(crate) fn together(all: impl IntoIterator<Item = StimulusParams>) -> Option<Self> {
         let least = |first: Self, other: Self| match first.margin.least(&other.margin) {
             own if own == first.margin => first,
-            margin => StimulusParams { margin, reduction: Reduction::Area, ..first },
+            margin => StimulusParams {
+                margin,
+                reduction: Reduction::Area,
+                ..first
+            },
         };
         all.into_iter().reduce(least)
     }
@@ -78,7 +82,10 @@ impl StimulusParams {
         match (self.margin.is_none(), self.margin.left_of([height, width])) {
             (true, _) => format!("all {whole}"),
             (false, Some([rows, columns])) => {
-                format!("{rows} × {columns} of {whole} (stimulus.margin = {})", self.margin)
+                format!(
+                    "{rows} × {columns} of {whole} (stimulus.margin = {})",
+                    self.margin
+                )
             }
             (false, None) => format!("none of {whole} (stimulus.margin = {})", self.margin),
         }
@@ -89,7 +96,10 @@ impl StimulusParams {
     /// # Errors
     /// Returns [`StimulusError::Level`] if it is below 0, 1 or more, or NaN.
     pub(crate) fn validate(&self) -> Result<(), StimulusError> {
-        (0.0..1.0).contains(&self.level).then_some(()).ok_or(StimulusError::Level(self.level))
+        (0.0..1.0)
+            .contains(&self.level)
+            .then_some(())
+            .ok_or(StimulusError::Level(self.level))
     }
 }
 
@@ -97,7 +107,9 @@ impl StimulusParams {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum StimulusError {
     /// The body has no rows or no columns.
-    #[error("a body of {height} x {width} voxels has no place for a stimulus; both sides must be at least 1")]
+    #[error(
+        "a body of {height} x {width} voxels has no place for a stimulus; both sides must be at least 1"
+    )]
     Empty {
         /// Rows of the body.
         height: usize,
@@ -182,14 +194,21 @@ pub fn stimulus(
         return Err(StimulusError::TooLarge { height, width });
     }
     if image.height() == 0 || image.width() == 0 {
-        return Err(StimulusError::NoPixels { height: image.height(), width: image.width() });
+        return Err(StimulusError::NoPixels {
+            height: image.height(),
+            width: image.width(),
+        });
     }
     params.validate()?;
     let middle = match params.margin {
         margin if margin.is_none() => Cow::Borrowed(image),
         margin => {
             let (height, width) = (image.height(), image.width());
-            Cow::Owned(margin.cut(image).ok_or(StimulusError::Margin { margin, height, width })?)
+            Cow::Owned(margin.cut(image).ok_or(StimulusError::Margin {
+                margin,
+                height,
+                width,
+            })?)
         }
     };
     let reduced = match params.reduction {
@@ -205,11 +224,16 @@ pub fn stimulus(
 
 fn strided(image: &Grid<u8>, height: usize, width: usize) -> Result<Grid<f64>, StimulusError> {
     let stride = |axis, body, image: usize| {
-        image.is_multiple_of(body).then_some(image / body).ok_or(StimulusError::Stride { axis, body, image })
+        image
+            .is_multiple_of(body)
+            .then_some(image / body)
+            .ok_or(StimulusError::Stride { axis, body, image })
     };
     let rows = stride("rows", height, image.height())?;
     let columns = stride("columns", width, image.width())?;
-    Ok(Grid::from_fn(height, width, |r, c| f64::from(image[(r * rows, c * columns)])))
+    Ok(Grid::from_fn(height, width, |r, c| {
+        f64::from(image[(r * rows, c * columns)])
+    }))
 }
 
 /// Reduces the image to a grid of another size by area-weighted means, 0 … 255. In units of
@@ -225,7 +249,8 @@ pub(crate) fn averaged(image: &Grid<u8>, height: usize, width: usize) -> Grid<f6
         let mut sum = 0u64;
         for pixel_row in r * tall / height..((r + 1) * tall).div_ceil(height) {
             for pixel_column in c * wide / width..((c + 1) * wide).div_ceil(width) {
-                let area = overlap(r, tall, pixel_row, height) * overlap(c, wide, pixel_column, width);
+                let area =
+                    overlap(r, tall, pixel_row, height) * overlap(c, wide, pixel_column, width);
                 sum += u64::from(image[(pixel_row, pixel_column)]) * area as u64;
             }
         }
@@ -240,7 +265,11 @@ mod tests {
     use Reduction::{Area, Stride};
 
     fn params(reduction: Reduction, encoding: Encoding) -> StimulusParams {
-        StimulusParams { reduction, encoding, ..StimulusParams::default() }
+        StimulusParams {
+            reduction,
+            encoding,
+            ..StimulusParams::default()
+        }
     }
 
     fn ramp(height: usize, width: usize) -> Grid<u8> {
@@ -251,7 +280,10 @@ mod tests {
     fn stride_keeps_rows_and_columns_0_2_4() {
         let image = ramp(28, 28);
         let grid = stimulus(&image, 14, 14, &params(Stride, Intensity)).unwrap();
-        assert!(grid.iter().all(|((r, c), &v)| v == f64::from(image[(2 * r, 2 * c)]) / 255.0));
+        assert!(
+            grid.iter()
+                .all(|((r, c), &v)| v == f64::from(image[(2 * r, 2 * c)]) / 255.0)
+        );
         let uneven = stimulus(&image, 28, 7, &params(Stride, Intensity)).unwrap();
         assert_eq!(uneven[(27, 6)], f64::from(image[(27, 24)]) / 255.0);
     }
@@ -259,19 +291,40 @@ mod tests {
     #[test]
     fn stride_refuses_sides_that_do_not_divide_and_names_the_way_out() {
         let error = stimulus(&ramp(28, 28), 14, 13, &params(Stride, Intensity)).unwrap_err();
-        assert_eq!(error, StimulusError::Stride { axis: "columns", body: 13, image: 28 });
+        assert_eq!(
+            error,
+            StimulusError::Stride {
+                axis: "columns",
+                body: 13,
+                image: 28
+            }
+        );
         assert!(error.to_string().contains("area"), "{error}");
         assert!(stimulus(&ramp(28, 28), 56, 14, &params(Stride, Intensity)).is_err());
         assert!(stimulus(&ramp(28, 28), 0, 14, &params(Area, Intensity)).is_err());
         let error = stimulus(&ramp(28, 28), 1 << 58, 28, &params(Area, Intensity)).unwrap_err();
-        assert_eq!(error, StimulusError::TooLarge { height: 1 << 58, width: 28 });
+        assert_eq!(
+            error,
+            StimulusError::TooLarge {
+                height: 1 << 58,
+                width: 28
+            }
+        );
     }
 
     #[test]
     fn encodings_are_the_papers() {
         let image = Grid::from_rows(vec![vec![0, 1, 128, 255]]).unwrap();
-        let cells = |encoding| stimulus(&image, 1, 4, &params(Stride, encoding)).unwrap().cells().to_vec();
-        let above = |level| StimulusParams { level, ..params(Stride, Threshold) };
+        let cells = |encoding| {
+            stimulus(&image, 1, 4, &params(Stride, encoding))
+                .unwrap()
+                .cells()
+                .to_vec()
+        };
+        let above = |level| StimulusParams {
+            level,
+            ..params(Stride, Threshold)
+        };
         assert_eq!(cells(Intensity), [0.0, 1.0 / 255.0, 128.0 / 255.0, 1.0]);
         assert_eq!(cells(Saturated), [0.0, 1.0, 1.0, 1.0]);
         assert_eq!(cells(Threshold), [0.0, 0.0, 1.0, 1.0]);
@@ -286,19 +339,26 @@ mod tests {
     fn area_averaging_is_exact_and_keeps_the_mean() {
         let quarter = Grid::from_rows(vec![vec![0, 255], vec![0, 1]]).unwrap();
         assert_eq!(
-            stimulus(&quarter, 1, 1, &params(Area, Intensity)).unwrap().cells(),
+            stimulus(&quarter, 1, 1, &params(Area, Intensity))
+                .unwrap()
+                .cells(),
             [256.0 / 4.0 / 255.0]
         );
         // The mean is encoded, not the pixels: 64/255 exceeds 0.25, as only one pixel does.
         let above = |level| {
-            let params = StimulusParams { level, ..params(Area, Threshold) };
+            let params = StimulusParams {
+                level,
+                ..params(Area, Threshold)
+            };
             stimulus(&quarter, 1, 1, &params).unwrap()[(0, 0)]
         };
         assert_eq!((above(0.25), above(0.26)), (1.0, 0.0));
         // Three pixels on two voxels: the middle one is shared half and half.
         let thirds = Grid::from_rows(vec![vec![30, 60, 90]]).unwrap();
         assert_eq!(
-            stimulus(&thirds, 1, 2, &params(Area, Intensity)).unwrap().cells(),
+            stimulus(&thirds, 1, 2, &params(Area, Intensity))
+                .unwrap()
+                .cells(),
             [40.0 / 255.0, 80.0 / 255.0]
         );
         let image = ramp(28, 28);
@@ -314,7 +374,10 @@ mod tests {
     fn area_averaging_by_a_whole_factor_of_one_is_the_image() {
         let image = ramp(7, 9);
         let same = stimulus(&image, 7, 9, &params(Area, Intensity)).unwrap();
-        assert_eq!(same, stimulus(&image, 7, 9, &params(Stride, Intensity)).unwrap());
+        assert_eq!(
+            same,
+            stimulus(&image, 7, 9, &params(Stride, Intensity)).unwrap()
+        );
     }
 
     #[test]
@@ -323,57 +386,127 @@ mod tests {
         let middle = Grid::from_fn(5, 8, |r, c| image[(r + 2, c + 2)]);
         for (reduction, width) in [(Area, 3), (Stride, 4)] {
             let whole = params(reduction, Intensity);
-            let cut = StimulusParams { margin: Margins::same(2), ..whole };
-            assert_eq!(stimulus(&image, 5, width, &cut), stimulus(&middle, 5, width, &whole));
+            let cut = StimulusParams {
+                margin: Margins::same(2),
+                ..whole
+            };
+            assert_eq!(
+                stimulus(&image, 5, width, &cut),
+                stimulus(&middle, 5, width, &whole)
+            );
         }
         for margin in [5, usize::MAX].map(Margins::same) {
-            let cut = StimulusParams { margin, ..params(Area, Intensity) };
+            let cut = StimulusParams {
+                margin,
+                ..params(Area, Intensity)
+            };
             let error = stimulus(&image, 3, 3, &cut).unwrap_err();
-            assert_eq!(error, StimulusError::Margin { margin, height: 9, width: 12 });
+            assert_eq!(
+                error,
+                StimulusError::Margin {
+                    margin,
+                    height: 9,
+                    width: 12
+                }
+            );
         }
-        let edge = StimulusParams { margin: Margins::same(4), ..params(Area, Intensity) };
+        let edge = StimulusParams {
+            margin: Margins::same(4),
+            ..params(Area, Intensity)
+        };
         assert_eq!(stimulus(&image, 1, 1, &edge).unwrap().area(), 1);
     }
 
     #[test]
     fn the_part_that_is_seen_is_said_in_pixels() {
-        let part = |margin| StimulusParams { margin, ..params(Area, Intensity) }.part([17, 28]);
+        let part = |margin| {
+            StimulusParams {
+                margin,
+                ..params(Area, Intensity)
+            }
+            .part([17, 28])
+        };
         assert_eq!(part(Margins::default()), "all 17 × 28 pixels");
-        assert_eq!(part(Margins::same(4)), "9 × 20 of 17 × 28 pixels (stimulus.margin = 4)");
-        let uneven = Margins { top: 1, right: 2, bottom: 3, left: 4 };
-        assert_eq!(part(uneven), "13 × 22 of 17 × 28 pixels (stimulus.margin = [1, 2, 3, 4])");
-        assert_eq!(part(Margins::same(9)), "none of 17 × 28 pixels (stimulus.margin = 9)");
+        assert_eq!(
+            part(Margins::same(4)),
+            "9 × 20 of 17 × 28 pixels (stimulus.margin = 4)"
+        );
+        let uneven = Margins {
+            top: 1,
+            right: 2,
+            bottom: 3,
+            left: 4,
+        };
+        assert_eq!(
+            part(uneven),
+            "13 × 22 of 17 × 28 pixels (stimulus.margin = [1, 2, 3, 4])"
+        );
+        assert_eq!(
+            part(Margins::same(9)),
+            "none of 17 × 28 pixels (stimulus.margin = 9)"
+        );
     }
 
     #[test]
     fn bodies_see_together_what_any_of_them_sees() {
-        let [a, b] = [[1, 5, 3, 0], [4, 2, 2, 2]].map(|[top, right, bottom, left]| StimulusParams {
-            margin: Margins { top, right, bottom, left },
-            ..params(Area, Threshold)
-        });
+        let [a, b] =
+            [[1, 5, 3, 0], [4, 2, 2, 2]].map(|[top, right, bottom, left]| StimulusParams {
+                margin: Margins {
+                    top,
+                    right,
+                    bottom,
+                    left,
+                },
+                ..params(Area, Threshold)
+            });
         let together = StimulusParams::together([a, StimulusParams { level: 0.2, ..b }]).unwrap();
         assert_eq!(
             together,
-            StimulusParams { margin: Margins { top: 1, right: 2, bottom: 2, left: 0 }, ..a }
+            StimulusParams {
+                margin: Margins {
+                    top: 1,
+                    right: 2,
+                    bottom: 2,
+                    left: 0
+                },
+                ..a
+            }
         );
-        assert_eq!((StimulusParams::together([a]), StimulusParams::together([])), (Some(a), None));
+        assert_eq!(
+            (StimulusParams::together([a]), StimulusParams::together([])),
+            (Some(a), None)
+        );
         // A stride requires its own margin.
-        let [whole, cut] = [0, 4]
-            .map(|margin| StimulusParams { margin: Margins::same(margin), ..params(Stride, Intensity) });
+        let [whole, cut] = [0, 4].map(|margin| StimulusParams {
+            margin: Margins::same(margin),
+            ..params(Stride, Intensity)
+        });
         assert_eq!(StimulusParams::together([whole, cut]), Some(whole));
-        assert_eq!(StimulusParams::together([cut, whole]), Some(params(Area, Intensity)));
+        assert_eq!(
+            StimulusParams::together([cut, whole]),
+            Some(params(Area, Intensity))
+        );
     }
 
     #[test]
     fn configs_name_them_in_lower_case() {
         let read = |text: &str| serde_json::from_str::<StimulusParams>(text).unwrap();
         assert_eq!(read("{}"), StimulusParams::default());
-        let threshold = StimulusParams { level: 0.25, ..params(Stride, Threshold) };
-        assert_eq!(read("{\"encoding\": \"threshold\", \"level\": 0.25}"), threshold);
+        let threshold = StimulusParams {
+            level: 0.25,
+            ..params(Stride, Threshold)
+        };
+        assert_eq!(
+            read("{\"encoding\": \"threshold\", \"level\": 0.25}"),
+            threshold
+        );
         assert_eq!(serde_json::to_string(&Area).unwrap(), "\"area\"");
         let text = |params: &StimulusParams| serde_json::to_string(params).unwrap();
         assert!(!text(&threshold).contains("margin"));
-        let cut = StimulusParams { margin: Margins::same(4), ..threshold };
+        let cut = StimulusParams {
+            margin: Margins::same(4),
+            ..threshold
+        };
         assert_eq!(read(&text(&cut)), cut);
     }
 }

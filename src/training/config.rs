@@ -31,26 +31,46 @@ pub(crate) fn config_of(
     seed: Option<u64>,
     set: &[String],
 ) -> Result<Config, Error> {
-    let evaluation = EvaluationConfig { fitness: Fitness::MeanClipped };
+    let evaluation = EvaluationConfig {
+        fitness: Fitness::MeanClipped,
+    };
     let base = Config {
         seed: seed.unwrap_or(of_walkers.seed),
         generations: 1,
-        task: TaskConfig { groups: Some(groups.clone()), ..TaskConfig::default() },
-        data: DataConfig { train_images: None, ..of_walkers.data.clone() },
-        protocol: Protocol { rollout: RolloutMode::Fresh, ..of_walkers.protocol.clone() },
+        task: TaskConfig {
+            groups: Some(groups.clone()),
+            ..TaskConfig::default()
+        },
+        data: DataConfig {
+            train_images: None,
+            ..of_walkers.data.clone()
+        },
+        protocol: Protocol {
+            rollout: RolloutMode::Fresh,
+            ..of_walkers.protocol.clone()
+        },
         evaluation,
-        validation: ValidationConfig { best: 1, ..of_walkers.validation },
+        validation: ValidationConfig {
+            best: 1,
+            ..of_walkers.validation
+        },
         ..of_walkers.clone()
     };
     let asked = base.clone();
     let check = |config: &Config| {
-        fixed(config, &asked).and_then(|()| config.validate()).and_then(|()| enough(config, groups))
+        fixed(config, &asked)
+            .and_then(|()| config.validate())
+            .and_then(|()| enough(config, groups))
     };
     let config = reading::changed(base, set, check, |error| error)?;
     let BodyConfig { height, width, .. } = of_walkers.body;
     if (config.body.height, config.body.width) != (height, width) {
         let found = format!("{} × {} voxels", config.body.height, config.body.width);
-        return Err(Error::value("body", found, &format!("{height} × {width}, as the gaits have")));
+        return Err(Error::value(
+            "body",
+            found,
+            &format!("{height} × {width}, as the gaits have"),
+        ));
     }
     if config.task != asked.task {
         return Err(Error::at_key(
@@ -59,7 +79,11 @@ pub(crate) fn config_of(
         ));
     }
     if config.seed != asked.seed {
-        return Err(Error::value("seed", config.seed, &format!("{}, as said elsewhere", asked.seed)));
+        return Err(Error::value(
+            "seed",
+            config.seed,
+            &format!("{}, as said elsewhere", asked.seed),
+        ));
     }
     Ok(config)
 }
@@ -67,7 +91,10 @@ pub(crate) fn config_of(
 /// Checks that designs are compared on an image of every class. The groups alternate; the first
 /// begins.
 fn enough(config: &Config, [a, b]: &[Vec<u8>; 2]) -> Result<(), Error> {
-    let (found, least) = (config.train.final_images, (2 * a.len()).saturating_sub(1).max(2 * b.len()));
+    let (found, least) = (
+        config.train.final_images,
+        (2 * a.len()).saturating_sub(1).max(2 * b.len()),
+    );
     match found < least {
         true => {
             let expected = format!("{least} or more, for an image of every class");
@@ -80,17 +107,32 @@ fn enough(config: &Config, [a, b]: &[Vec<u8>; 2]) -> Result<(), Error> {
 /// Checks that no key overrides a setting that every training fixes.
 fn fixed(config: &Config, asked: &Config) -> Result<(), Error> {
     let fixed = [
-        ("generations", config.generations != asked.generations, "has rounds and challengers"),
+        (
+            "generations",
+            config.generations != asked.generations,
+            "has rounds and challengers",
+        ),
         (
             "data.images_per_class",
             config.data.images_per_class != asked.data.images_per_class,
             "has train.images_per_class",
         ),
-        ("evaluation", config.evaluation != asked.evaluation, "has a fitness of its own"),
-        ("protocol.rollout", config.protocol.rollout != asked.protocol.rollout, "has fresh rollouts"),
+        (
+            "evaluation",
+            config.evaluation != asked.evaluation,
+            "has a fitness of its own",
+        ),
+        (
+            "protocol.rollout",
+            config.protocol.rollout != asked.protocol.rollout,
+            "has fresh rollouts",
+        ),
     ];
     match fixed.into_iter().find(|(_, is_set, _)| *is_set) {
-        Some((key, _, has)) => Err(Error::at_key(key, format!("expected without: a training {has}"))),
+        Some((key, _, has)) => Err(Error::at_key(
+            key,
+            format!("expected without: a training {has}"),
+        )),
         None => Ok(()),
     }
 }
@@ -106,15 +148,23 @@ pub(crate) fn sized(
     set: &[String],
     session: &Session,
 ) -> Config {
-    let is_asked = set.iter().any(|assignment| reading::sets(assignment, "stimulus.margin"));
+    let is_asked = set
+        .iter()
+        .any(|assignment| reading::sets(assignment, "stimulus.margin"));
     let size = size_of(their_data, &of_gaits.data.dataset, dataset);
-    let (said, shown) = (part_of_others(&config, size, dataset, Split::Train), dataset.size(Split::Train));
+    let (said, shown) = (
+        part_of_others(&config, size, dataset, Split::Train),
+        dataset.size(Split::Train),
+    );
     match (said, size, shown) {
         (None, ..) => config,
         (Some(_), Some([height, width]), Some(shown)) if !is_asked => {
             let margin = config.stimulus.margin;
             let config = Config {
-                stimulus: StimulusParams { margin: Margins::default(), ..config.stimulus },
+                stimulus: StimulusParams {
+                    margin: Margins::default(),
+                    ..config.stimulus
+                },
                 ..config
             };
             session.observer.warning(&format!(
@@ -154,14 +204,21 @@ pub(crate) fn with_images(
         // A number of validation images that the user chose is kept or refused, never reduced.
         let is_asked = images != ValidationConfig::default().images;
         if !is_asked && (LEAST..images).contains(&there) {
-            session
-                .observer
-                .warning(&format!("validating on {there} images in place of {images}: there are no more"));
+            session.observer.warning(&format!(
+                "validating on {there} images in place of {images}: there are no more"
+            ));
             validation.images = there;
         }
     }
-    let data = DataConfig { images_per_class: per_class, ..config.data.clone() };
-    let config = Config { data, validation, ..config };
+    let data = DataConfig {
+        images_per_class: per_class,
+        ..config.data.clone()
+    };
+    let config = Config {
+        data,
+        validation,
+        ..config
+    };
     config.validate()?;
     held_out::check(&config, before, "train.images_per_class", dataset)?;
     Ok(config)
@@ -173,16 +230,27 @@ pub(crate) fn with_images(
 /// If it is ambiguous, the error says what to write.
 pub(crate) fn check_groups(groups: &Groups, dataset: &Dataset) -> Result<(), Error> {
     let there = dataset.classes(Split::Train);
-    groups.check_among(&there).map_err(|error| Error::usage(error.to_string()))
+    groups
+        .check_among(&there)
+        .map_err(|error| Error::usage(error.to_string()))
 }
 
 /// Checks before a run evolves that its gaits can later be trained on these groups.
 ///
 /// # Errors
 /// Returns an error if the config or the available images do not allow it.
-pub(crate) fn check(evolved: &Config, groups: &[Vec<u8>; 2], whereabouts: &Whereabouts) -> Result<(), Error> {
+pub(crate) fn check(
+    evolved: &Config,
+    groups: &[Vec<u8>; 2],
+    whereabouts: &Whereabouts,
+) -> Result<(), Error> {
     let config = config_of(evolved, groups, None, &[])?;
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;
-    with_images(config, &TrainingImages::indices(evolved, &dataset)?, &dataset, &Session::default())
-        .map(|_| ())
+    with_images(
+        config,
+        &TrainingImages::indices(evolved, &dataset)?,
+        &dataset,
+        &Session::default(),
+    )
+    .map(|_| ())
 }

@@ -28,12 +28,22 @@ pub(crate) struct Walker<'a> {
 }
 
 /// Returns the origin of the gaits, with the images they were trained on; those cannot validate.
-pub(crate) fn origin(source: &StoredRun, config: &Config, dataset: &Dataset) -> Result<Origin, Error> {
+pub(crate) fn origin(
+    source: &StoredRun,
+    config: &Config,
+    dataset: &Dataset,
+) -> Result<Origin, Error> {
     let run = &source.run;
-    let sha256 = dataset.fingerprint(Split::Train).expect("a training loads its training images");
-    let all = run.origin.as_ref().map_or(Vec::new(), |origin| origin.elsewhere.clone());
-    let (here, mut elsewhere): (Vec<_>, Vec<_>) =
-        all.into_iter().partition(|other| other.train_sha256 == sha256);
+    let sha256 = dataset
+        .fingerprint(Split::Train)
+        .expect("a training loads its training images");
+    let all = run
+        .origin
+        .as_ref()
+        .map_or(Vec::new(), |origin| origin.elsewhere.clone());
+    let (here, mut elsewhere): (Vec<_>, Vec<_>) = all
+        .into_iter()
+        .partition(|other| other.train_sha256 == sha256);
     let mut trained_on = BTreeSet::new();
     match sha256 == run.dataset.train_sha256 {
         true => trained_on = held_out::trained_on(run, dataset)?,
@@ -42,7 +52,12 @@ pub(crate) fn origin(source: &StoredRun, config: &Config, dataset: &Dataset) -> 
     }
     for earlier in here {
         trained_on.extend(earlier.indices);
-        if let Some(Drawn { classes, images_per_class, seed }) = earlier.drawn {
+        if let Some(Drawn {
+            classes,
+            images_per_class,
+            seed,
+        }) = earlier.drawn
+        {
             let drawn = dataset.draw(Split::Train, &classes, images_per_class, seed);
             trained_on.extend(drawn.map_err(|error| Error::input(error.to_string()))?);
         }
@@ -73,8 +88,14 @@ pub(crate) fn walkers<'a>(
         let Some(gait) = Gait::of(&chosen.robot.body) else {
             continue;
         };
-        if walkers.iter().all(|other| other.gait.probe() != gait.probe()) {
-            walkers.push(Walker { robot: chosen.robot, gait });
+        if walkers
+            .iter()
+            .all(|other| other.gait.probe() != gait.probe())
+        {
+            walkers.push(Walker {
+                robot: chosen.robot,
+                gait,
+            });
         }
     }
     if walkers.is_empty() {
@@ -99,10 +120,17 @@ pub(crate) fn measured(
     let nothing = || vec![Vec::new(); walkers.len()];
     // If the response of a named run was measured, it is in the current folder.
     let made = folder::beside(&source.path, RESPONSE_JSON);
-    let path = if made.exists() { made } else { source.path.with_file_name(RESPONSE_JSON) };
+    let path = if made.exists() {
+        made
+    } else {
+        source.path.with_file_name(RESPONSE_JSON)
+    };
     let of_run = &source.run.config;
     // Responses are measured in fresh rollouts.
-    let protocol = Protocol { rollout: RolloutMode::Fresh, ..of_run.protocol.clone() };
+    let protocol = Protocol {
+        rollout: RolloutMode::Fresh,
+        ..of_run.protocol.clone()
+    };
     if (&config.physics, &config.protocol) != (&of_run.physics, &protocol) {
         return nothing();
     }
@@ -110,7 +138,10 @@ pub(crate) fn measured(
         return nothing();
     };
     let (run, seed, conditions) = (source.run.fingerprint(), of_run.seed, probing.conditions());
-    walkers.iter().map(|walker| file.known(&run, seed, conditions, &walker.gait).0.to_vec()).collect()
+    walkers
+        .iter()
+        .map(|walker| file.known(&run, seed, conditions, &walker.gait).0.to_vec())
+        .collect()
 }
 
 /// Hashes all that rollouts depend on, but not the challengers: more of them only add rollouts.
@@ -120,10 +151,20 @@ pub(crate) fn key(
     walkers: &[Walker],
     training: &TrainingImages,
 ) -> String {
-    let bodies: Vec<String> = walkers.iter().map(|walker| walker.robot.body.to_string()).collect();
+    let bodies: Vec<String> = walkers
+        .iter()
+        .map(|walker| walker.robot.body.to_string())
+        .collect();
     let images: Vec<usize> = training.images.iter().map(|image| image.index).collect();
-    let train = TrainConfig { challengers: 0, ..config.train };
-    let essence = Config { train, ..config.essence() }.to_toml();
+    let train = TrainConfig {
+        challengers: 0,
+        ..config.train
+    };
+    let essence = Config {
+        train,
+        ..config.essence()
+    }
+    .to_toml();
     let text = format!(
         "{} {essence} {seed_of_gaits} {bodies:?} {} {images:?}",
         env!("CARGO_PKG_VERSION"),
@@ -136,7 +177,10 @@ impl Elsewhere {
     /// Returns the training images of a run.
     fn of(run: &RunFile) -> Self {
         let config = &run.config;
-        let before = run.origin.iter().flat_map(|origin| origin.trained_on.iter().copied());
+        let before = run
+            .origin
+            .iter()
+            .flat_map(|origin| origin.trained_on.iter().copied());
         let drawn = || Drawn {
             classes: config.classes(),
             images_per_class: config.data.images_per_class,
@@ -144,7 +188,12 @@ impl Elsewhere {
         };
         Elsewhere {
             train_sha256: run.dataset.train_sha256.clone(),
-            indices: run.training_images.iter().map(|image| image.index).chain(before).collect(),
+            indices: run
+                .training_images
+                .iter()
+                .map(|image| image.index)
+                .chain(before)
+                .collect(),
             drawn: config.data.train_images.is_none().then(drawn),
         }
     }

@@ -44,11 +44,16 @@ pub(crate) struct Log<'a> {
 }
 
 impl<'a> Log<'a> {
-    pub(crate) fn open(path: PathBuf, key: String, session: &'a Session<'a>) -> Result<Self, Error> {
+    pub(crate) fn open(
+        path: PathBuf,
+        key: String,
+        session: &'a Session<'a>,
+    ) -> Result<Self, Error> {
         let mut batches = Vec::new();
         if path.exists() {
             let name = path.display().to_string();
-            let file: File = results::read(&path, None).map_err(|error| error.remedy(Remedy::Replace))?;
+            let file: File =
+                results::read(&path, None).map_err(|error| error.remedy(Remedy::Replace))?;
             if file.key != key {
                 let text = format!(
                     "{name}: expected the training that began here: other robots, images or settings"
@@ -57,20 +62,32 @@ impl<'a> Log<'a> {
                 return Err(error.remedy(Remedy::ChooseOut).remedy(Remedy::Replace));
             }
             if file.checksum.is_none() {
-                session
-                    .observer
-                    .warning(&format!("{name}: it has no checksum, so damage to it would go unnoticed"));
+                session.observer.warning(&format!(
+                    "{name}: it has no checksum, so damage to it would go unnoticed"
+                ));
             }
             batches = file.rollouts;
         }
         let saved = (count(&batches), Instant::now());
         let has_simulated = Arc::default();
-        Ok(Log { path, key, batches, asked: 0, simulated: 0, saved, done: None, has_simulated, session })
+        Ok(Log {
+            path,
+            key,
+            batches,
+            asked: 0,
+            simulated: 0,
+            saved,
+            done: None,
+            has_simulated,
+            session,
+        })
     }
 
     /// Starts work whose progress is counted in rollouts.
     pub(crate) fn begins(&mut self, label: String, rollouts: usize) {
-        self.session.observer.begins(&Work::new(label, rollouts as u64, "rollouts"));
+        self.session
+            .observer
+            .begins(&Work::new(label, rollouts as u64, "rollouts"));
         self.done = Some(AtomicU64::new(0));
     }
 
@@ -84,7 +101,11 @@ impl<'a> Log<'a> {
 
     /// Starts work whose progress is counted in challengers.
     pub(crate) fn begins_challenges(&mut self, challengers: usize) {
-        self.session.observer.begins(&Work::new("refining:".to_string(), challengers as u64, "challengers"));
+        self.session.observer.begins(&Work::new(
+            "refining:".to_string(),
+            challengers as u64,
+            "challengers",
+        ));
         self.done = None;
     }
 
@@ -95,7 +116,9 @@ impl<'a> Log<'a> {
         }
         if let Some(done) = &self.done {
             self.session.observer.skips(count - simulated);
-            self.session.observer.progress(done.fetch_add(count, Ordering::Relaxed) + count);
+            self.session
+                .observer
+                .progress(done.fetch_add(count, Ordering::Relaxed) + count);
         }
     }
 
@@ -127,7 +150,8 @@ impl<'a> Log<'a> {
             None => None,
         };
         let setting = (&config.physics, &config.protocol);
-        self.batches.push(begun.unwrap_or_else(|| known[..known.len().min(stimuli.len())].to_vec()));
+        self.batches
+            .push(begun.unwrap_or_else(|| known[..known.len().min(stimuli.len())].to_vec()));
         self.rolled(self.batches[number].len() as u64, 0);
         // Simulating part by part lets a stopped training resume after the last part.
         let part = PART * rayon::current_num_threads();
@@ -153,8 +177,10 @@ impl<'a> Log<'a> {
             return Ok(());
         }
         let file = File::new(self.key.clone(), self.batches.clone());
-        let text = serde_json::to_string(&file).expect("numbers are finite and keys are text") + "\n";
-        write_atomically(&self.path, text.as_bytes()).map_err(|error| Error::writing(&self.path, &error))?;
+        let text =
+            serde_json::to_string(&file).expect("numbers are finite and keys are text") + "\n";
+        write_atomically(&self.path, text.as_bytes())
+            .map_err(|error| Error::writing(&self.path, &error))?;
         self.saved = (rollouts, Instant::now());
         Ok(())
     }
@@ -165,7 +191,8 @@ fn count(batches: &[Batch]) -> usize {
 }
 
 pub(crate) fn stopped() -> Error {
-    Error::stopped("stopped; what was simulated is saved".to_string()).remedy(Remedy::RepeatResuming)
+    Error::stopped("stopped; what was simulated is saved".to_string())
+        .remedy(Remedy::RepeatResuming)
 }
 
 /// Rollouts that are recorded in the log.
@@ -178,9 +205,17 @@ pub(crate) struct Kept<'a, 'b> {
 impl Rollouts for Kept<'_, '_> {
     type Error = Error;
 
-    fn roll(&mut self, body: &Body, stimuli: &[Grid<f64>], conditions: &[usize]) -> Result<Batch, Error> {
-        let conditions: Vec<Condition> =
-            conditions.iter().map(|number| self.conditions[*number].clone()).collect();
-        self.log.rollouts(body, (stimuli, &conditions), &[], self.config)
+    fn roll(
+        &mut self,
+        body: &Body,
+        stimuli: &[Grid<f64>],
+        conditions: &[usize],
+    ) -> Result<Batch, Error> {
+        let conditions: Vec<Condition> = conditions
+            .iter()
+            .map(|number| self.conditions[*number].clone())
+            .collect();
+        self.log
+            .rollouts(body, (stimuli, &conditions), &[], self.config)
     }
 }

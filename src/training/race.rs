@@ -68,8 +68,13 @@ impl WeightedImage {
     /// Prepares images for a robot whose first group walks to this side: 1 right, −1 left. Both
     /// groups have the same total weight, however many images each has.
     pub(crate) fn all(images: &[&Image], side: f64) -> Vec<Self> {
-        let of =
-            |right: f64| images.iter().filter(|image| image.example.right == right).count().max(1) as f64;
+        let of = |right: f64| {
+            images
+                .iter()
+                .filter(|image| image.example.right == right)
+                .count()
+                .max(1) as f64
+        };
         let shown = |image: &&Image| WeightedImage {
             stimulus: image.stimulus.clone(),
             condition: image.condition,
@@ -173,7 +178,11 @@ impl<'a> Refinement<'a> {
     /// Returns the champion's fitness: the weighted mean clipped margin of its answers.
     pub(crate) fn fitness(&self) -> f64 {
         let all: f64 = self.images.iter().map(|image| image.weight).sum();
-        let scores = self.images.iter().zip(&self.displacements).map(|(image, d)| self.score(image, *d));
+        let scores = self
+            .images
+            .iter()
+            .zip(&self.displacements)
+            .map(|(image, d)| self.score(image, *d));
         scores.sum::<f64>() / all
     }
 
@@ -200,9 +209,14 @@ impl<'a> Refinement<'a> {
         let (mut look, mut shown, mut is_stable) = (FIRST_LOOK, 0, true);
         while found.len() < order.len() && !self.is_behind(&order, &found) {
             let next = &order[found.len()..order.len().min(found.len() + look)];
-            let stimuli: Vec<Grid<f64>> =
-                next.iter().map(|number| self.images[*number].stimulus.clone()).collect();
-            let conditions: Vec<usize> = next.iter().map(|number| self.images[*number].condition).collect();
+            let stimuli: Vec<Grid<f64>> = next
+                .iter()
+                .map(|number| self.images[*number].stimulus.clone())
+                .collect();
+            let conditions: Vec<usize> = next
+                .iter()
+                .map(|number| self.images[*number].condition)
+                .collect();
             let rolled = rollouts.roll(&challenger, &stimuli, &conditions)?;
             shown += rolled.len();
             let Some(walked) = rolled.into_iter().collect::<Option<Vec<f64>>>() else {
@@ -216,8 +230,14 @@ impl<'a> Refinement<'a> {
         if !other_gait {
             self.learn(&challenger, &order, &found);
         }
-        let gains = || order.iter().zip(&found).map(|(number, d)| self.gain(*number, *d));
-        let (gain, squares) = gains().fold((0.0, 0.0), |(sum, squares), g| (sum + g, squares + g * g));
+        let gains = || {
+            order
+                .iter()
+                .zip(&found)
+                .map(|(number, d)| self.gain(*number, *d))
+        };
+        let (gain, squares) =
+            gains().fold((0.0, 0.0), |(sum, squares), g| (sum + g, squares + g * g));
         let error = (squares - gain * gain / order.len() as f64).max(0.0).sqrt();
         let won = is_stable && found.len() == order.len() && gain > ERRORS_TO_WIN * error;
         if won {
@@ -227,7 +247,13 @@ impl<'a> Refinement<'a> {
             self.body = challenger;
             self.evidence.fade(FADE);
         }
-        Ok(Challenge { number: self.challenges, other_gait, shown, fitness: self.fitness(), won })
+        Ok(Challenge {
+            number: self.challenges,
+            other_gait,
+            shown,
+            fitness: self.fitness(),
+            won,
+        })
     }
 
     /// Proposes a challenger.
@@ -267,8 +293,10 @@ impl<'a> Refinement<'a> {
         // The model finds no better design: change one place at random.
         let mut other: Design = design;
         let place = random.below(other.len());
-        let others: Vec<Material> =
-            CHOICES.into_iter().filter(|material| *material != other[place]).collect();
+        let others: Vec<Material> = CHOICES
+            .into_iter()
+            .filter(|material| *material != other[place])
+            .collect();
         other[place] = others[random.below(others.len())];
         gait.built(&other)
     }
@@ -290,7 +318,12 @@ impl<'a> Refinement<'a> {
     }
 
     fn random(&self, what: Use) -> Stream {
-        stream(self.seed, Purpose::Training, what as u64, self.challenges as u64)
+        stream(
+            self.seed,
+            Purpose::Training,
+            what as u64,
+            self.challenges as u64,
+        )
     }
 
     /// Orders the images at random, those first on which the champion can be beaten.
@@ -317,7 +350,12 @@ impl<'a> Refinement<'a> {
             self.images.iter().map(|image| image.weight).sum::<f64>() / self.images.len() as f64;
         let mut bound = 0.0;
         for open in [true, false] {
-            let of_kind = || order.iter().enumerate().filter(|(_, number)| self.is_open(**number) == open);
+            let of_kind = || {
+                order
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, number)| self.is_open(**number) == open)
+            };
             let (mut seen, mut sum, mut squares, mut most, mut left) = (0.0, 0.0, 0.0, 0.0, 0.0);
             for (turn, number) in of_kind() {
                 match found.get(turn) {
@@ -329,7 +367,8 @@ impl<'a> Refinement<'a> {
                     }
                     None => {
                         let image = &self.images[*number];
-                        most += (image.weight - self.score(image, self.displacements[*number])) / mean_weight;
+                        most += (image.weight - self.score(image, self.displacements[*number]))
+                            / mean_weight;
                         left += 1.0;
                     }
                 }
@@ -361,7 +400,9 @@ impl<'a> Refinement<'a> {
                 if before == after {
                     return 0.0;
                 }
-                let of = |material: &Material| width(*material, stimulus.or_default(place), self.physics);
+                let of = |material: &Material| {
+                    width(*material, stimulus.or_default(place), self.physics)
+                };
                 of(after) - of(before)
             };
             let widths: Vec<f64> = pairs().map(wider).collect();
@@ -372,11 +413,18 @@ impl<'a> Refinement<'a> {
 }
 
 /// Returns the displacements of a body \[voxel lengths\]; 0 where it is unstable.
-fn shown<R: Rollouts>(body: &Body, images: &[WeightedImage], rollouts: &mut R) -> Result<Vec<f64>, R::Error> {
+fn shown<R: Rollouts>(
+    body: &Body,
+    images: &[WeightedImage],
+    rollouts: &mut R,
+) -> Result<Vec<f64>, R::Error> {
     let stimuli: Vec<Grid<f64>> = images.iter().map(|image| image.stimulus.clone()).collect();
     let conditions: Vec<usize> = images.iter().map(|image| image.condition).collect();
     let found = rollouts.roll(body, &stimuli, &conditions)?;
-    Ok(found.into_iter().map(|displacement| displacement.unwrap_or(0.0)).collect())
+    Ok(found
+        .into_iter()
+        .map(|displacement| displacement.unwrap_or(0.0))
+        .collect())
 }
 
 #[derive(Clone, Copy)]
@@ -428,16 +476,28 @@ mod tests {
         let image = |number: usize| {
             let right = if number.is_multiple_of(2) { 1.0 } else { -1.0 };
             let stimulus = Grid::from_fn(1, PLACES, |_, column| {
-                let likely = if column.is_multiple_of(2) == (right > 0.0) { 0.75 } else { 0.25 };
+                let likely = if column.is_multiple_of(2) == (right > 0.0) {
+                    0.75
+                } else {
+                    0.25
+                };
                 f64::from(u8::from(random.unit() < likely))
             });
-            WeightedImage { stimulus, condition: 0, right, weight: 1.0 }
+            WeightedImage {
+                stimulus,
+                condition: 0,
+                right,
+                weight: 1.0,
+            }
         };
         (0..count).map(image).collect()
     }
 
     fn planted() -> Planted {
-        Planted { physics: Physics::default(), simulated: 0 }
+        Planted {
+            physics: Physics::default(),
+            simulated: 0,
+        }
     }
 
     /// Refines a body of soft voxels; returns the champion, the fitness after each challenge, and
@@ -458,9 +518,16 @@ mod tests {
         }
         assert_eq!(rollouts.simulated, refinement.rollouts());
         // The reported displacements are the champion's own.
-        let stimuli: Vec<Grid<f64>> = refinement.images.iter().map(|image| image.stimulus.clone()).collect();
+        let stimuli: Vec<Grid<f64>> = refinement
+            .images
+            .iter()
+            .map(|image| image.stimulus.clone())
+            .collect();
         let Ok(walked) = rollouts.roll(refinement.body(), &stimuli, &[]);
-        assert_eq!(walked.into_iter().flatten().collect::<Vec<_>>(), refinement.displacements());
+        assert_eq!(
+            walked.into_iter().flatten().collect::<Vec<_>>(),
+            refinement.displacements()
+        );
         (refinement.body().clone(), course, refinement.rollouts())
     }
 
@@ -473,7 +540,11 @@ mod tests {
         assert!(rollouts < 200 * 61 * 2 / 3, "{rollouts}");
         // The place with the largest slope expands: its pixel is bright where right is correct.
         assert_eq!(body.voxels()[(0, 0)], Material::SensorExpand);
-        assert_eq!(refined(60), (body, course, rollouts), "the same seed refines the same");
+        assert_eq!(
+            refined(60),
+            (body, course, rollouts),
+            "the same seed refines the same"
+        );
     }
 
     #[test]
@@ -481,14 +552,26 @@ mod tests {
         let gait = Gait::of(&"66".parse().unwrap()).unwrap();
         let image = |right: f64| {
             let stimulus = Grid::from_fn(1, 2, |_, _| 1.0);
-            let example =
-                Example { right, weight: 0.25, ..Example::new(&gait, &stimulus, &Physics::default()) };
-            Image { stimulus, class: 0, example, condition: 0 }
+            let example = Example {
+                right,
+                weight: 0.25,
+                ..Example::new(&gait, &stimulus, &Physics::default())
+            };
+            Image {
+                stimulus,
+                class: 0,
+                example,
+                condition: 0,
+            }
         };
         let images = [image(1.0), image(-1.0), image(-1.0), image(-1.0)];
         let shown = WeightedImage::all(&images.iter().collect::<Vec<_>>(), -1.0);
         let weight = |right: f64| -> f64 {
-            shown.iter().filter(|shown| shown.right == right).map(|shown| shown.weight).sum()
+            shown
+                .iter()
+                .filter(|shown| shown.right == right)
+                .map(|shown| shown.weight)
+                .sum()
         };
         assert!((weight(-1.0) - 0.5).abs() < 1e-12 && (weight(1.0) - 0.5).abs() < 1e-12);
     }
@@ -499,11 +582,20 @@ mod tests {
         let evidence = (Evidence::new(PLACES), 1.0);
         let good: Body = "656565656565".parse().unwrap();
         let bad: Body = "565656565656".parse().unwrap();
-        let Ok(mut refinement) =
-            Refinement::new(good.clone(), images(200), evidence.clone(), (&physics, 0, 5), &mut rollouts);
+        let Ok(mut refinement) = Refinement::new(
+            good.clone(),
+            images(200),
+            evidence.clone(),
+            (&physics, 0, 5),
+            &mut rollouts,
+        );
         let Ok(challenge) = refinement.challenge(bad.clone(), &mut rollouts);
-        assert_eq!((challenge.won, challenge.shown, challenge.other_gait), (false, FIRST_LOOK, false));
-        let Ok(mut refinement) = Refinement::new(bad, images(200), evidence, (&physics, 0, 5), &mut rollouts);
+        assert_eq!(
+            (challenge.won, challenge.shown, challenge.other_gait),
+            (false, FIRST_LOOK, false)
+        );
+        let Ok(mut refinement) =
+            Refinement::new(bad, images(200), evidence, (&physics, 0, 5), &mut rollouts);
         let Ok(challenge) = refinement.challenge(good.clone(), &mut rollouts);
         assert_eq!((challenge.won, challenge.shown), (true, 200));
         assert_eq!(*refinement.body(), good);
@@ -530,10 +622,18 @@ mod tests {
             }
         }
         let (mut rollouts, physics) = (planted(), Physics::default());
-        let (good, bad): (Body, Body) = ("656565656565".parse().unwrap(), "565656565656".parse().unwrap());
+        let (good, bad): (Body, Body) = (
+            "656565656565".parse().unwrap(),
+            "565656565656".parse().unwrap(),
+        );
         let evidence = (Evidence::new(PLACES), 1.0);
-        let Ok(mut refinement) =
-            Refinement::new(bad.clone(), images(200), evidence, (&physics, 0, 5), &mut rollouts);
+        let Ok(mut refinement) = Refinement::new(
+            bad.clone(),
+            images(200),
+            evidence,
+            (&physics, 0, 5),
+            &mut rollouts,
+        );
         let Ok(challenge) = refinement.challenge(good, &mut Shaky(rollouts));
         assert_eq!((challenge.won, challenge.shown), (false, FIRST_LOOK));
         assert_eq!(*refinement.body(), bad);

@@ -133,7 +133,11 @@ impl<'a> GaitTrainer<'a> {
         plan: TrainingPlan,
         physics: &'a Physics,
     ) -> Self {
-        let conditions = 1 + images.iter().map(|image| image.condition).max().expect("there are images");
+        let conditions = 1 + images
+            .iter()
+            .map(|image| image.condition)
+            .max()
+            .expect("there are images");
         let mut evidence = response.evidence.clone();
         evidence.fade(RANDOM_WEIGHT);
         let mut teacher = GaitTrainer {
@@ -190,7 +194,8 @@ impl<'a> GaitTrainer<'a> {
         let mut random = self.random(Use::Round, self.rounds as u64);
         let (measured, off) = self.measured(&mut random, rollouts)?;
         let before = self.design.clone();
-        let (predicted, design) = self.solved(&before, self.side, |lesson| lesson.solve(&mut random));
+        let (predicted, design) =
+            self.solved(&before, self.side, |lesson| lesson.solve(&mut random));
         let round = Round {
             round: self.rounds,
             predicted: self.predicted,
@@ -239,8 +244,9 @@ impl<'a> GaitTrainer<'a> {
             (*number, self.design.iter().map(material).collect())
         };
         let asked: Vec<(usize, Design)> = numbers.iter().enumerate().map(draw).collect();
-        let as_probe =
-            |(number, design): &(usize, Design)| self.gait.as_probe(design, &self.images[*number].stimulus);
+        let as_probe = |(number, design): &(usize, Design)| {
+            self.gait.as_probe(design, &self.images[*number].stimulus)
+        };
         let stimuli: Vec<Grid<f64>> = asked.iter().map(as_probe).collect();
         let body = self.gait.probe_of(&self.design);
         let found = rollouts.roll(&body, &stimuli, &self.conditions_of(&numbers))?;
@@ -249,7 +255,9 @@ impl<'a> GaitTrainer<'a> {
         let mut sets = vec![Moments::new(self.design.len()); self.conditions];
         let (mut off, mut stable) = (0.0, 0.0);
         for ((number, design), displacement) in asked.iter().zip(&found) {
-            let Image { example, condition, .. } = &self.images[*number];
+            let Image {
+                example, condition, ..
+            } = &self.images[*number];
             let widths = example.widths(design);
             let Some(displacement) = displacement else {
                 continue;
@@ -265,10 +273,17 @@ impl<'a> GaitTrainer<'a> {
         if known.iter().any(Option::is_some) {
             let of_known: Vec<f64> = known.iter().copied().flatten().collect();
             let mean = of_known.iter().sum::<f64>() / of_known.len() as f64;
-            self.intercepts = known.into_iter().map(|intercept| intercept.unwrap_or(mean)).collect();
+            self.intercepts = known
+                .into_iter()
+                .map(|intercept| intercept.unwrap_or(mean))
+                .collect();
         }
-        let of_itself = asked.iter().zip(&found).filter(|((_, design), _)| *design == self.design);
-        let measured = self.mean_score(of_itself.map(|((number, _), found)| (*number, nowhere(*found))));
+        let of_itself = asked
+            .iter()
+            .zip(&found)
+            .filter(|((_, design), _)| *design == self.design);
+        let measured =
+            self.mean_score(of_itself.map(|((number, _), found)| (*number, nowhere(*found))));
         Ok((measured, if stable > 0.0 { off / stable } else { 0.0 }))
     }
 
@@ -287,7 +302,12 @@ impl<'a> GaitTrainer<'a> {
         let cell = |(row, column): &(usize, usize)| row * body.width() + column;
         let cells: Vec<usize> = self.gait.places().iter().map(cell).collect();
         let evidence = self.evidence.among(&cells, body.height() * body.width());
-        let TrainingPlan { seed, challengers, min_muscles, .. } = self.plan;
+        let TrainingPlan {
+            seed,
+            challengers,
+            min_muscles,
+            ..
+        } = self.plan;
         let (mut numbers, images) = self.compared_on(0);
         let mut refinement = Refinement::new(
             body,
@@ -327,7 +347,8 @@ impl<'a> GaitTrainer<'a> {
     fn finalists(&self) -> Vec<Design> {
         let mut finalists: Vec<Design> = Vec::new();
         for design in self.earlier.iter().rev() {
-            if finalists.len() < FINALISTS && *design != self.design && !finalists.contains(design) {
+            if finalists.len() < FINALISTS && *design != self.design && !finalists.contains(design)
+            {
                 finalists.push(design.clone());
             }
         }
@@ -353,11 +374,16 @@ impl<'a> GaitTrainer<'a> {
     /// images.
     fn drawn(&self, count: usize, random: &mut Stream) -> Vec<usize> {
         let of = |right: f64| -> Vec<usize> {
-            (0..self.images.len()).filter(|number| self.images[*number].example.right == right).collect()
+            (0..self.images.len())
+                .filter(|number| self.images[*number].example.right == right)
+                .collect()
         };
         let mut groups = [1.0, -1.0].map(|right| {
             let all = of(right);
-            random.sample(all.len(), all.len()).into_iter().map(move |number| all[number])
+            random
+                .sample(all.len(), all.len())
+                .into_iter()
+                .map(move |number| all[number])
         });
         let mut drawn = Vec::new();
         let mut turn = 0;
@@ -373,12 +399,18 @@ impl<'a> GaitTrainer<'a> {
     fn with_every_class(&self, mut numbers: Vec<usize>, random: &mut Stream) -> Vec<usize> {
         let classes: BTreeSet<u8> = self.images.iter().map(|image| image.class).collect();
         for class in classes {
-            let count = |class: u8| numbers.iter().filter(|n| self.images[**n].class == class).count();
+            let count = |class: u8| {
+                numbers
+                    .iter()
+                    .filter(|n| self.images[**n].class == class)
+                    .count()
+            };
             if count(class) > 0 {
                 continue;
             }
-            let all: Vec<usize> =
-                (0..self.images.len()).filter(|number| self.images[*number].class == class).collect();
+            let all: Vec<usize> = (0..self.images.len())
+                .filter(|number| self.images[*number].class == class)
+                .collect();
             let right = self.images[all[0]].example.right;
             let has_another = |number: &usize| {
                 let image = &self.images[*number];
@@ -392,7 +424,10 @@ impl<'a> GaitTrainer<'a> {
     }
 
     fn conditions_of(&self, numbers: &[usize]) -> Vec<usize> {
-        numbers.iter().map(|number| self.images[*number].condition).collect()
+        numbers
+            .iter()
+            .map(|number| self.images[*number].condition)
+            .collect()
     }
 
     /// Returns the mean clipped margin of displacements, given by the numbers of their training
@@ -405,15 +440,26 @@ impl<'a> GaitTrainer<'a> {
             scores[group] += clipped_margin(self.side * right * displacement);
             counts[group] += 1.0;
         }
-        let means = scores.iter().zip(&counts).filter(|(_, count)| **count > 0.0);
+        let means = scores
+            .iter()
+            .zip(&counts)
+            .filter(|(_, count)| **count > 0.0);
         let means: Vec<f64> = means.map(|(sum, count)| sum / count).collect();
         means.iter().sum::<f64>() / means.len().max(1) as f64
     }
 
     /// Solves the design problem from a design on; returns the predicted objective and the
     /// solution.
-    fn solved(&self, from: &[Material], side: f64, solve: impl FnOnce(&mut DesignProblem)) -> (f64, Design) {
-        let examples = self.images.iter().map(|image| (&image.example, self.intercepts[image.condition]));
+    fn solved(
+        &self,
+        from: &[Material],
+        side: f64,
+        solve: impl FnOnce(&mut DesignProblem),
+    ) -> (f64, Design) {
+        let examples = self
+            .images
+            .iter()
+            .map(|image| (&image.example, self.intercepts[image.condition]));
         let mut lesson = DesignProblem::predicted(examples, &self.slopes, from, side);
         solve(&mut lesson);
         (lesson.objective(), lesson.design())
@@ -466,7 +512,8 @@ mod tests {
         }
 
         fn walks(&self, widths: &[f64], condition: usize) -> f64 {
-            let moved = |(width, slope): (&f64, &f64)| slope * (width - 1.1) + 0.5 * (width - 1.1).powi(2);
+            let moved =
+                |(width, slope): (&f64, &f64)| slope * (width - 1.1) + 0.5 * (width - 1.1).powi(2);
             let moved: f64 = widths.iter().zip(&self.slopes).map(moved).sum();
             30.0 * ((moved + [3.0, -2.0][condition]) / 30.0).tanh()
         }
@@ -476,14 +523,32 @@ mod tests {
             let mut image = |number: usize| {
                 let right = if number.is_multiple_of(2) { 1.0 } else { -1.0 };
                 // Every pixel carries a little information about the class.
-                let bright = |c: usize| 0.5 + if c.is_multiple_of(2) { 0.15 * right } else { -0.15 * right };
+                let bright = |c: usize| {
+                    0.5 + if c.is_multiple_of(2) {
+                        0.15 * right
+                    } else {
+                        -0.15 * right
+                    }
+                };
                 let stimulus = Grid::from_fn(1, self.slopes.len(), |_, column| {
                     f64::from(u8::from(random.unit() < bright(column)))
                 });
-                let example = Example { right, ..Example::new(&self.gait, &stimulus, &self.physics) };
+                let example = Example {
+                    right,
+                    ..Example::new(&self.gait, &stimulus, &self.physics)
+                };
                 // The second group has many classes; the last of them is rare.
-                let class = if right > 0.0 { 0 } else { 1 + (number / 2 % 49 / 8) as u8 };
-                Image { stimulus, class, example, condition: number / 2 % 2 }
+                let class = if right > 0.0 {
+                    0
+                } else {
+                    1 + (number / 2 % 49 / 8) as u8
+                };
+                Image {
+                    stimulus,
+                    class,
+                    example,
+                    condition: number / 2 % 2,
+                }
             };
             (0..count).map(&mut image).collect()
         }
@@ -494,18 +559,31 @@ mod tests {
             let mut shown = |number: usize| {
                 let image = random_image(1, self.slopes.len(), &self.physics, &mut random);
                 let widths = self.gait.widths(&probe, &image, &self.physics);
-                RandomRollout { displacement: self.walks(&widths, number % 2), widths, condition: number % 2 }
+                RandomRollout {
+                    displacement: self.walks(&widths, number % 2),
+                    widths,
+                    condition: number % 2,
+                }
             };
             Response::of(&(0..rollouts).map(&mut shown).collect::<Vec<_>>()).unwrap()
         }
 
         /// Trains; returns the design, the rounds, and the accuracies of the first and the last
         /// design.
-        fn taught(&mut self, images: usize, response: usize) -> (TrainedDesign, Vec<Round>, [f64; 2]) {
+        fn taught(
+            &mut self,
+            images: usize,
+            response: usize,
+        ) -> (TrainedDesign, Vec<Round>, [f64; 2]) {
             let (gait, physics) = (self.gait.clone(), self.physics.clone());
             let images = self.images(images);
-            let mut teacher =
-                GaitTrainer::new(&gait, &self.response(response), images.clone(), PLAN, &physics);
+            let mut teacher = GaitTrainer::new(
+                &gait,
+                &self.response(response),
+                images.clone(),
+                PLAN,
+                &physics,
+            );
             let first = (teacher.design.clone(), teacher.side);
             let mut rounds = Vec::new();
             for _ in 0..PLAN.rounds {
@@ -523,7 +601,10 @@ mod tests {
                 };
                 images.iter().zip(walked).filter(is_right).count() as f64 / images.len() as f64
             };
-            let shares = [share((gait.built(&first.0), first.1)), share((taught.body.clone(), taught.side))];
+            let shares = [
+                share((gait.built(&first.0), first.1)),
+                share((taught.body.clone(), taught.side)),
+            ];
             (taught, rounds, shares)
         }
     }
@@ -540,7 +621,8 @@ mod tests {
             let design: Design = body.voxels().cells().to_vec();
             self.asked.push((design.clone(), stimuli.len()));
             let walk = |(stimulus, condition): (&Grid<f64>, &usize)| {
-                let wide = |(column, material): (usize, &Material)| match CHOICES.contains(material) {
+                let wide = |(column, material): (usize, &Material)| match CHOICES.contains(material)
+                {
                     true => crate::sim::width(*material, stimulus[(0, column)], &self.physics),
                     false => 1.1,
                 };
@@ -551,8 +633,14 @@ mod tests {
         }
     }
 
-    const PLAN: TrainingPlan =
-        TrainingPlan { seed: 3, rounds: 4, images: 60, final_images: 100, challengers: 12, min_muscles: 0 };
+    const PLAN: TrainingPlan = TrainingPlan {
+        seed: 3,
+        rounds: 4,
+        images: 60,
+        final_images: 100,
+        challengers: 12,
+        min_muscles: 0,
+    };
 
     #[test]
     fn a_gait_is_taught_more_than_a_response_of_few_rollouts_says() {
@@ -562,17 +650,39 @@ mod tests {
         assert_eq!(rounds.len(), PLAN.rounds);
         let shown = (FINALISTS + PLAN.challengers) * PLAN.final_images;
         assert!(taught.rollouts <= PLAN.rounds * PLAN.images + shown);
-        assert_eq!(taught.rollouts, planted.asked.iter().map(|(_, images)| images).sum::<usize>());
+        assert_eq!(
+            taught.rollouts,
+            planted
+                .asked
+                .iter()
+                .map(|(_, images)| images)
+                .sum::<usize>()
+        );
         assert!(rounds.last().unwrap().off.abs() < 2.0, "{rounds:?}");
         // The reported displacements are those measured, under images of both groups.
         let images = planted.images(600);
         assert_eq!((taught.shown.len(), taught.displacements.len()), (100, 100));
-        let right = taught.shown.iter().filter(|number| images[**number].example.right == 1.0).count();
+        let right = taught
+            .shown
+            .iter()
+            .filter(|number| images[**number].example.right == 1.0)
+            .count();
         assert_eq!(right, 50);
-        let stimuli: Vec<_> = taught.shown.iter().map(|number| images[*number].stimulus.clone()).collect();
-        let conditions: Vec<_> = taught.shown.iter().map(|number| images[*number].condition).collect();
+        let stimuli: Vec<_> = taught
+            .shown
+            .iter()
+            .map(|number| images[*number].stimulus.clone())
+            .collect();
+        let conditions: Vec<_> = taught
+            .shown
+            .iter()
+            .map(|number| images[*number].condition)
+            .collect();
         let Ok(walked) = planted.roll(&taught.body, &stimuli, &conditions);
-        assert_eq!(walked.into_iter().flatten().collect::<Vec<_>>(), taught.displacements);
+        assert_eq!(
+            walked.into_iter().flatten().collect::<Vec<_>>(),
+            taught.displacements
+        );
     }
 
     #[test]
@@ -580,24 +690,46 @@ mod tests {
         let (_, rounds, _) = Planted::new(40).taught(600, 400);
         let mean = |of: fn(&Round) -> f64| rounds.iter().map(of).sum::<f64>() / rounds.len() as f64;
         let (predicted, measured) = (mean(|round| round.predicted), mean(|round| round.measured));
-        assert!((predicted - measured).abs() < 0.15, "{predicted} {measured}");
+        assert!(
+            (predicted - measured).abs() < 0.15,
+            "{predicted} {measured}"
+        );
     }
 
     #[test]
     fn designs_are_compared_on_an_image_of_every_class_if_there_is_room() {
         let planted = Planted::new(4);
-        let (gait, response, images) = (planted.gait.clone(), planted.response(40), planted.images(600));
+        let (gait, response, images) = (
+            planted.gait.clone(),
+            planted.response(40),
+            planted.images(600),
+        );
         let classes = |final_images: usize, draw: usize| -> BTreeSet<u8> {
-            let plan = TrainingPlan { final_images, ..PLAN };
-            let teacher = GaitTrainer::new(&gait, &response, images.clone(), plan, &planted.physics);
+            let plan = TrainingPlan {
+                final_images,
+                ..PLAN
+            };
+            let teacher =
+                GaitTrainer::new(&gait, &response, images.clone(), plan, &planted.physics);
             let (numbers, _) = teacher.compared_on(draw);
-            assert_eq!(numbers.iter().collect::<BTreeSet<_>>().len(), final_images, "each once");
-            let first = numbers.iter().filter(|number| images[**number].class == 0).count();
+            assert_eq!(
+                numbers.iter().collect::<BTreeSet<_>>().len(),
+                final_images,
+                "each once"
+            );
+            let first = numbers
+                .iter()
+                .filter(|number| images[**number].class == 0)
+                .count();
             assert_eq!(first, final_images.div_ceil(2));
             numbers.iter().map(|number| images[*number].class).collect()
         };
         for draw in 0..20 {
-            assert_eq!(classes(14, draw).len(), 8, "seven classes of one group in seven images");
+            assert_eq!(
+                classes(14, draw).len(),
+                8,
+                "seven classes of one group in seven images"
+            );
             assert_eq!(classes(40, draw).len(), 8);
         }
         assert_eq!(classes(2, 0).len(), 2);
@@ -612,9 +744,16 @@ mod tests {
 
     #[test]
     fn a_gait_that_is_never_stable_ends_with_its_first_design_and_gets_nowhere() {
-        let mut planted = Planted { unstable: true, ..Planted::new(10) };
+        let mut planted = Planted {
+            unstable: true,
+            ..Planted::new(10)
+        };
         let (taught, rounds, _) = planted.taught(100, 40);
         assert!(taught.displacements.iter().all(|d| *d == 0.0) && taught.objective == 0.0);
-        assert!(rounds.iter().all(|round| round.measured == 0.0 && round.off == 0.0));
+        assert!(
+            rounds
+                .iter()
+                .all(|round| round.measured == 0.0 && round.off == 0.0)
+        );
     }
 }

@@ -44,11 +44,18 @@ impl Trainer<'_> {
         measured: &[Option<f64>],
         log: &mut Log,
     ) -> Result<Option<Response>, Error> {
-        let Trainer { config, probing, .. } = self;
+        let Trainer {
+            config, probing, ..
+        } = self;
         let count = config.train.random_images;
-        let shown = probing.shown(gait, &config.physics, 0..count, |probe, stimuli, conditions| {
-            log.rollouts(probe, (stimuli, conditions), measured, config)
-        })?;
+        let shown = probing.shown(
+            gait,
+            &config.physics,
+            0..count,
+            |probe, stimuli, conditions| {
+                log.rollouts(probe, (stimuli, conditions), measured, config)
+            },
+        )?;
         Ok(response(&shown, count))
     }
 
@@ -60,39 +67,72 @@ impl Trainer<'_> {
         log: &Log,
         session: &Session,
     ) -> Result<Config, Error> {
-        let Trainer { config, training, .. } = self;
+        let Trainer {
+            config, training, ..
+        } = self;
         let (count, robot) = (config.train.windows_tried(), &walker.robot.id);
         let mut with = (*config).clone();
         with.train.windows = 0;
         if count == 0 {
             return Ok(with);
         }
-        session.observer.begins(&Work::new(format!("{robot}: windows:"), count as u64, "windows"));
+        session.observer.begins(&Work::new(
+            format!("{robot}: windows:"),
+            count as u64,
+            "windows",
+        ));
         let windows = Windows::of(config, self.dataset, &training.images, self.groups())?;
         let told = |tried: usize| session.observer.progress(tried as u64);
-        let found = windows.best(&walker.gait, response, log.session, &told).map_err(|_| stopped())?;
+        let found = windows
+            .best(&walker.gait, response, log.session, &told)
+            .map_err(|_| stopped())?;
         report_window(session, robot, &found, count);
         with.stimulus.margin = found.margins;
         Ok(with)
     }
 
     fn groups(&self) -> &[Vec<u8>; 2] {
-        self.config.task.groups.as_ref().expect("a training has two groups")
+        self.config
+            .task
+            .groups
+            .as_ref()
+            .expect("a training has two groups")
     }
 
     /// Returns the training images as a gait sees them; both groups weigh the same.
     fn images(&self, gait: &Gait, config: &Config) -> Result<Vec<Image>, Error> {
-        let Trainer { training, probing, .. } = self;
+        let Trainer {
+            training, probing, ..
+        } = self;
         let all = probing.conditions();
         let [first, _] = self.groups();
         let ways = balanced(training.images.iter().map(|image| image.label), first);
-        let image = |((image, condition), (right, weight)): ((&ImageRef, &Condition), (f64, f64))| {
-            let stimulus = see(config, self.dataset, Split::Train, image.index)?;
-            let condition = all.iter().position(|other| other == condition).expect("it is one of all");
-            let example = Example { right, weight, ..Example::new(gait, &stimulus, &config.physics) };
-            Ok(Image { stimulus, class: image.label, example, condition })
-        };
-        training.images.iter().zip(&training.conditions).zip(ways).map(image).collect()
+        let image =
+            |((image, condition), (right, weight)): ((&ImageRef, &Condition), (f64, f64))| {
+                let stimulus = see(config, self.dataset, Split::Train, image.index)?;
+                let condition = all
+                    .iter()
+                    .position(|other| other == condition)
+                    .expect("it is one of all");
+                let example = Example {
+                    right,
+                    weight,
+                    ..Example::new(gait, &stimulus, &config.physics)
+                };
+                Ok(Image {
+                    stimulus,
+                    class: image.label,
+                    example,
+                    condition,
+                })
+            };
+        training
+            .images
+            .iter()
+            .zip(&training.conditions)
+            .zip(ways)
+            .map(image)
+            .collect()
     }
 
     fn plan(&self) -> TrainingPlan {
@@ -115,11 +155,16 @@ impl Trainer<'_> {
         session: &Session,
     ) -> Result<(&'w Walker<'w>, Config, TrainedDesign), Error> {
         let plan = self.plan();
-        let Trainer { config, probing, .. } = self;
+        let Trainer {
+            config, probing, ..
+        } = self;
         let mut best: Option<(&Walker, Config, GaitTrainer)> = None;
         for (walker, measured) in walkers.iter().zip(&self.measured) {
             let (gait, robot) = (&walker.gait, &walker.robot.id);
-            log.begins(format!("{robot}: response:"), self.config.train.random_images);
+            log.begins(
+                format!("{robot}: response:"),
+                self.config.train.random_images,
+            );
             let Some(response) = self.response(gait, measured, log)? else {
                 continue;
             };
@@ -129,12 +174,19 @@ impl Trainer<'_> {
             let mut teacher = GaitTrainer::new(gait, &response, images, plan, &config.physics);
             let conditions = probing.conditions();
             log.begins_round(robot, 1, &plan);
-            let mut rollouts = Kept { config, conditions, log };
+            let mut rollouts = Kept {
+                config,
+                conditions,
+                log,
+            };
             match teacher.first(&mut rollouts)? {
                 First::Round(round) => report_round(session, robot, &round, &plan),
                 First::Own(fitness) => report_own(session, robot, fitness),
             }
-            if best.as_ref().is_none_or(|(_, _, best)| teacher.predicted() > best.predicted()) {
+            if best
+                .as_ref()
+                .is_none_or(|(_, _, best)| teacher.predicted() > best.predicted())
+            {
                 best = Some((walker, seeing, teacher));
             }
             if plan.rounds == 0 {
@@ -143,10 +195,15 @@ impl Trainer<'_> {
             }
         }
         let Some((walker, seeing, mut teacher)) = best else {
-            let text = "none of the chosen robots is stable with random images: there is nothing to train";
+            let text =
+                "none of the chosen robots is stable with random images: there is nothing to train";
             return Err(Error::input(text.to_string()).remedy(Remedy::ChooseRobots(None)));
         };
-        let mut rollouts = Kept { config, conditions: probing.conditions(), log };
+        let mut rollouts = Kept {
+            config,
+            conditions: probing.conditions(),
+            log,
+        };
         for number in 2..=plan.rounds {
             rollouts.log.begins_round(&walker.robot.id, number, &plan);
             let round = teacher.round(&mut rollouts)?;
@@ -168,7 +225,11 @@ impl Trainer<'_> {
 }
 
 fn report_response(session: &Session, robot: &str, gait: &Gait, response: &Response) {
-    let places = counted(gait.places().len(), "soft voxel or sensor", "soft voxels and sensors");
+    let places = counted(
+        gait.places().len(),
+        "soft voxel or sensor",
+        "soft voxels and sensors",
+    );
     let share = number::explained(response.r_squared);
     let noise = number::fixed(response.noise, 1);
     session.observer.note(&format!(
@@ -177,7 +238,11 @@ fn report_response(session: &Session, robot: &str, gait: &Gait, response: &Respo
 }
 
 fn report_window(session: &Session, robot: &str, found: &Found, tried: usize) {
-    let Found { margins, predicted, predicted_before } = found;
+    let Found {
+        margins,
+        predicted,
+        predicted_before,
+    } = found;
     let [after, before] = [predicted, predicted_before].map(|fitness| number::fixed(*fitness, 2));
     session.observer.note(&format!(
         "{robot}: of {tried} windows, stimulus.margin = {margins} is predicted to be best: fitness {after}, before {before}"
@@ -192,14 +257,30 @@ fn report_window(session: &Session, robot: &str, found: &Found, tried: usize) {
 }
 
 fn report_own(session: &Session, robot: &str, fitness: f64) {
-    session.observer.note(&format!("{robot}: fitness {} as it is", number::fixed(fitness, 2)));
-    session.observer.finding("own", &serde_json::json!({ "robot": robot, "fitness": fitness }));
+    session.observer.note(&format!(
+        "{robot}: fitness {} as it is",
+        number::fixed(fitness, 2)
+    ));
+    session.observer.finding(
+        "own",
+        &serde_json::json!({ "robot": robot, "fitness": fitness }),
+    );
 }
 
 fn report_round(session: &Session, robot: &str, round: &Round, plan: &TrainingPlan) {
-    let Round { round, predicted, measured, off, changed, rollouts } = round;
+    let Round {
+        round,
+        predicted,
+        measured,
+        off,
+        changed,
+        rollouts,
+    } = round;
     let [p, m] = [predicted, measured].map(|fitness| number::fixed(*fitness, 2));
-    session.observer.note(&format!("{robot}: round {round} of {}: fitness {m}, predicted {p}", plan.rounds));
+    session.observer.note(&format!(
+        "{robot}: round {round} of {}: fitness {m}, predicted {p}",
+        plan.rounds
+    ));
     session.observer.finding(
         "round",
         &serde_json::json!({
@@ -211,11 +292,23 @@ fn report_round(session: &Session, robot: &str, round: &Round, plan: &TrainingPl
 }
 
 fn report_challenge(session: &Session, challenge: &Challenge, challengers: usize) {
-    let Challenge { number, other_gait, shown, fitness, won } = challenge;
-    let what = if *other_gait { "another gait" } else { "other sensors" };
+    let Challenge {
+        number,
+        other_gait,
+        shown,
+        fitness,
+        won,
+    } = challenge;
+    let what = if *other_gait {
+        "another gait"
+    } else {
+        "other sensors"
+    };
     if *won {
         let fitness = number::fixed(*fitness, 3);
-        session.observer.note(&format!("challenger {number} of {challengers}: {what}: fitness {fitness}"));
+        session.observer.note(&format!(
+            "challenger {number} of {challengers}: {what}: fitness {fitness}"
+        ));
     }
     session.observer.progress(*number as u64);
     session.observer.finding(

@@ -70,8 +70,13 @@ impl<'a> Windows<'a> {
             let pixels = pixels.map_err(|error| Error::input(error.to_string()))?;
             Ok((right, weight, pixels))
         };
-        let images = some().zip(balanced(some().map(|image| image.label), first)).map(image);
-        Ok(Windows { images: images.collect::<Result<_, Error>>()?, config })
+        let images = some()
+            .zip(balanced(some().map(|image| image.label), first))
+            .map(image);
+        Ok(Windows {
+            images: images.collect::<Result<_, Error>>()?,
+            config,
+        })
     }
 
     /// Returns the window with the best prediction among the config's own, windows anywhere, and
@@ -89,7 +94,11 @@ impl<'a> Windows<'a> {
     ) -> Result<Found, Stopped> {
         let (margins, count) = (self.config.stimulus.margin, self.config.train.windows);
         let predicted = self.predicted(gait, response, margins);
-        let mut best = Found { margins, predicted, predicted_before: predicted };
+        let mut best = Found {
+            margins,
+            predicted,
+            predicted_before: predicted,
+        };
         let mut tried = 1;
         while tried < count {
             session.check()?;
@@ -101,11 +110,17 @@ impl<'a> Windows<'a> {
                 }
             };
             let drawn: Vec<Margins> = (tried..count.min(tried + BATCH)).map(draw).collect();
-            let found: Vec<f64> =
-                drawn.par_iter().map(|margins| self.predicted(gait, response, *margins)).collect();
+            let found: Vec<f64> = drawn
+                .par_iter()
+                .map(|margins| self.predicted(gait, response, *margins))
+                .collect();
             for (margins, predicted) in drawn.into_iter().zip(found) {
                 if predicted > best.predicted {
-                    best = Found { margins, predicted, ..best };
+                    best = Found {
+                        margins,
+                        predicted,
+                        ..best
+                    };
                 }
                 tried += 1;
             }
@@ -116,12 +131,19 @@ impl<'a> Windows<'a> {
 
     /// Returns the predicted mean clipped margin under a window.
     fn predicted(&self, gait: &Gait, response: &Response, margin: Margins) -> f64 {
-        let seen_as = StimulusParams { margin, ..self.config.stimulus };
+        let seen_as = StimulusParams {
+            margin,
+            ..self.config.stimulus
+        };
         let (height, width) = (self.config.body.height, self.config.body.width);
         let example = |(right, weight, image): &(f64, f64, Grid<u8>)| {
             let seen = stimulus(image, height, width, &seen_as)
                 .expect("a window leaves pixels, and areas fit any body");
-            Example { right: *right, weight: *weight, ..Example::new(gait, &seen, &self.config.physics) }
+            Example {
+                right: *right,
+                weight: *weight,
+                ..Example::new(gait, &seen, &self.config.physics)
+            }
         };
         let examples: Vec<Example> = self.images.iter().map(example).collect();
         let any = vec![Material::SensorExpand; gait.places().len()];
@@ -131,7 +153,10 @@ impl<'a> Windows<'a> {
             lesson.solve(&mut stream(self.config.seed, Purpose::Windows, 1, draw));
             lesson.objective()
         };
-        [(0, 1.0), (1, -1.0)].into_iter().map(solved).fold(f64::NEG_INFINITY, f64::max)
+        [(0, 1.0), (1, -1.0)]
+            .into_iter()
+            .map(solved)
+            .fold(f64::NEG_INFINITY, f64::max)
     }
 
     fn sides(&self) -> [usize; 2] {
@@ -146,19 +171,34 @@ impl<'a> Windows<'a> {
             let before = random.below(side - shown + 1);
             (before, side - shown - before)
         });
-        Margins { top: rows.0, bottom: rows.1, left: columns.0, right: columns.1 }
+        Margins {
+            top: rows.0,
+            bottom: rows.1,
+            left: columns.0,
+            right: columns.1,
+        }
     }
 
     /// Draws a window near another.
     fn near(&self, margins: Margins, random: &mut Stream) -> Margins {
         let [height, width] = self.sides();
         let mut moved = |side: usize, before: usize, after: usize| {
-            let [a, b] = [before, after].map(|edge| (edge + random.below(2 * NEAR + 1)).saturating_sub(NEAR));
-            if a + b + least(side) <= side { (a, b) } else { (before, after) }
+            let [a, b] = [before, after]
+                .map(|edge| (edge + random.below(2 * NEAR + 1)).saturating_sub(NEAR));
+            if a + b + least(side) <= side {
+                (a, b)
+            } else {
+                (before, after)
+            }
         };
         let (top, bottom) = moved(height, margins.top, margins.bottom);
         let (left, right) = moved(width, margins.left, margins.right);
-        Margins { top, right, bottom, left }
+        Margins {
+            top,
+            right,
+            bottom,
+            left,
+        }
     }
 }
 
@@ -187,16 +227,29 @@ mod tests {
             let gait = Gait::of(&"6666/6666/6666/6666".parse().unwrap()).unwrap();
             let mut random = stream(3, Purpose::RandomImages, 0, 0);
             let shown = |number: usize| {
-                let widths: Vec<f64> = (0..16).map(|_| if random.unit() < 0.5 { 0.6 } else { 1.6 }).collect();
+                let widths: Vec<f64> = (0..16)
+                    .map(|_| if random.unit() < 0.5 { 0.6 } else { 1.6 })
+                    .collect();
                 let moved = |place: &usize| place / 4 >= 2 && place % 4 >= 2;
-                let displacement = (0..16).filter(moved).map(|place| 6.0 * (widths[place] - 1.1)).sum();
-                RandomRollout { widths, displacement, condition: number % 2 }
+                let displacement = (0..16)
+                    .filter(moved)
+                    .map(|place| 6.0 * (widths[place] - 1.1))
+                    .sum();
+                RandomRollout {
+                    widths,
+                    displacement,
+                    condition: number % 2,
+                }
             };
             let rollouts: Vec<RandomRollout> = (0..200).map(shown).collect();
             let mut config = Config::load("quickstart.toml", &[]).unwrap();
             (config.body.height, config.body.width) = (4, 4);
             (config.stimulus.reduction, config.train.windows) = (Reduction::Area, windows);
-            Planted { config, gait, response: Response::of(&rollouts).unwrap() }
+            Planted {
+                config,
+                gait,
+                response: Response::of(&rollouts).unwrap(),
+            }
         }
 
         fn windows(&self) -> Windows<'_> {
@@ -215,11 +268,16 @@ mod tests {
                 });
                 (right, 0.01, image)
             };
-            Windows { images: (0..100).map(&mut image).collect(), config: &self.config }
+            Windows {
+                images: (0..100).map(&mut image).collect(),
+                config: &self.config,
+            }
         }
 
         fn best(&self) -> Found {
-            self.windows().best(&self.gait, &self.response, &Session::default(), &|_| ()).unwrap()
+            self.windows()
+                .best(&self.gait, &self.response, &Session::default(), &|_| ())
+                .unwrap()
         }
     }
 
@@ -227,7 +285,12 @@ mod tests {
     fn what_tells_classes_apart_is_brought_to_where_the_body_is_moved() {
         let found = Planted::new(300).best();
         // The window ends within the quarter, below and on the right.
-        let Margins { top, right, bottom, left } = found.margins;
+        let Margins {
+            top,
+            right,
+            bottom,
+            left,
+        } = found.margins;
         assert!(bottom >= 5 && right >= 5, "{found:?}");
         assert!(top < 6 && left < 6, "{found:?}");
         assert!(found.predicted > found.predicted_before + 0.3, "{found:?}");
@@ -236,7 +299,12 @@ mod tests {
     #[test]
     fn one_window_is_that_of_the_config_and_more_are_never_worse() {
         let mut planted = Planted::new(1);
-        planted.config.stimulus.margin = Margins { top: 1, right: 2, bottom: 3, left: 4 };
+        planted.config.stimulus.margin = Margins {
+            top: 1,
+            right: 2,
+            bottom: 3,
+            left: 4,
+        };
         let found = planted.best();
         assert_eq!(
             (found.margins, found.predicted),
@@ -247,9 +315,14 @@ mod tests {
             planted.config.train.windows = windows;
             let counted = std::sync::Mutex::new(0);
             let tell = |tried: usize| *counted.lock().unwrap() = tried;
-            let found =
-                planted.windows().best(&planted.gait, &planted.response, &Session::default(), &tell).unwrap();
-            assert!(found.predicted >= found.predicted_before, "{windows}: {found:?}");
+            let found = planted
+                .windows()
+                .best(&planted.gait, &planted.response, &Session::default(), &tell)
+                .unwrap();
+            assert!(
+                found.predicted >= found.predicted_before,
+                "{windows}: {found:?}"
+            );
             told.push(*counted.lock().unwrap());
         }
         assert_eq!(told, [2, 21, 90]);
@@ -263,12 +336,28 @@ mod tests {
         let mut last = Margins::default();
         let mut edges = [false; 4];
         for _ in 0..2000 {
-            for margins in [windows.anywhere(&mut random), windows.near(last, &mut random)] {
-                let Margins { top, right, bottom, left } = margins;
-                assert!(top + bottom <= 12 - 3 && left + right <= 12 - 3, "{margins:?}");
+            for margins in [
+                windows.anywhere(&mut random),
+                windows.near(last, &mut random),
+            ] {
+                let Margins {
+                    top,
+                    right,
+                    bottom,
+                    left,
+                } = margins;
+                assert!(
+                    top + bottom <= 12 - 3 && left + right <= 12 - 3,
+                    "{margins:?}"
+                );
                 last = margins;
             }
-            let Margins { top, right, bottom, left } = last;
+            let Margins {
+                top,
+                right,
+                bottom,
+                left,
+            } = last;
             edges = [
                 edges[0] || top == 0,
                 edges[1] || right == 0,

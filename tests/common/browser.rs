@@ -13,7 +13,12 @@ use std::time::{Duration, Instant};
 
 /// Time limit of every wait.
 const LIMIT: Duration = Duration::from_secs(25);
-const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
+const NAMES: [&str; 4] = [
+    "chromium",
+    "chromium-browser",
+    "google-chrome",
+    "google-chrome-stable",
+];
 const FLAGS: [&str; 12] = [
     "--headless",
     "--no-sandbox",
@@ -45,7 +50,11 @@ fn named() -> Option<PathBuf> {
     }
     let path = std::env::var_os("PATH")?;
     let places = || std::env::split_paths(&path);
-    NAMES.iter().find_map(|name| places().map(|folder| folder.join(name)).find(|file| file.is_file()))
+    NAMES.iter().find_map(|name| {
+        places()
+            .map(|folder| folder.join(name))
+            .find(|file| file.is_file())
+    })
 }
 
 /// A running browser; dropping it ends it.
@@ -63,16 +72,25 @@ impl Browser {
     pub fn start(program: &Path, sandbox: &Sandbox) -> Self {
         // It reads its commands from file 3 and answers to file 4.
         let mut child = Command::new("sh")
-            .args(["-c", "exec \"$0\" \"$@\" 3<&0 4>&1 </dev/null >/dev/null 2>&1"])
+            .args([
+                "-c",
+                "exec \"$0\" \"$@\" 3<&0 4>&1 </dev/null >/dev/null 2>&1",
+            ])
             .arg(program)
             .args(FLAGS)
-            .arg(format!("--user-data-dir={}", sandbox.path("profile").display()))
+            .arg(format!(
+                "--user-data-dir={}",
+                sandbox.path("profile").display()
+            ))
             .arg("about:blank")
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
-        let (to, mut out) = (child.stdin.take().unwrap(), BufReader::new(child.stdout.take().unwrap()));
+        let (to, mut out) = (
+            child.stdin.take().unwrap(),
+            BufReader::new(child.stdout.take().unwrap()),
+        );
         let (send, from) = channel();
         std::thread::spawn(move || {
             loop {
@@ -81,17 +99,28 @@ impl Browser {
                     return;
                 }
                 message.pop();
-                if send.send(serde_json::from_slice(&message).unwrap()).is_err() {
+                if send
+                    .send(serde_json::from_slice(&message).unwrap())
+                    .is_err()
+                {
                     return;
                 }
             }
         });
-        Browser { child, to, from, events: VecDeque::new(), number: 0 }
+        Browser {
+            child,
+            to,
+            from,
+            events: VecDeque::new(),
+            number: 0,
+        }
     }
 
     fn next(&mut self, until: Instant) -> Value {
         let left = until.saturating_duration_since(Instant::now());
-        self.from.recv_timeout(left).expect("the browser answers in time")
+        self.from
+            .recv_timeout(left)
+            .expect("the browser answers in time")
     }
 
     #[track_caller]
@@ -118,9 +147,18 @@ impl Browser {
     pub fn tab(&mut self, width: u32, height: u32, dark: bool) -> Tab<'_> {
         let target = self.call(None, "Target.createTarget", json!({ "url": "about:blank" }));
         let id = target["targetId"].clone();
-        let attached = self.call(None, "Target.attachToTarget", json!({ "targetId": id, "flatten": true }));
+        let attached = self.call(
+            None,
+            "Target.attachToTarget",
+            json!({ "targetId": id, "flatten": true }),
+        );
         let session = attached["sessionId"].as_str().unwrap().to_string();
-        let mut tab = Tab { browser: self, session, id, pointer: "mouse" };
+        let mut tab = Tab {
+            browser: self,
+            session,
+            id,
+            pointer: "mouse",
+        };
         for domain in ["Page.enable", "Runtime.enable", "Log.enable"] {
             tab.call(domain, json!({}));
         }
@@ -136,7 +174,9 @@ impl Browser {
 impl Drop for Browser {
     fn drop(&mut self) {
         // It should end with its pipe; if not, it is killed.
-        let _ = self.to.write_all(b"{\"id\":0,\"method\":\"Browser.close\"}\0");
+        let _ = self
+            .to
+            .write_all(b"{\"id\":0,\"method\":\"Browser.close\"}\0");
         let until = Instant::now() + Duration::from_secs(3);
         while matches!(self.child.try_wait(), Ok(None)) && Instant::now() < until {
             std::thread::sleep(Duration::from_millis(20));
@@ -168,9 +208,14 @@ impl Tab<'_> {
     /// Returns the value of an expression.
     #[track_caller]
     pub fn eval(&mut self, expression: &str) -> Value {
-        let params = json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
+        let params =
+            json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
         let result = self.call("Runtime.evaluate", params);
-        assert!(result["exceptionDetails"].is_null(), "{expression}: {}", result["exceptionDetails"]);
+        assert!(
+            result["exceptionDetails"].is_null(),
+            "{expression}: {}",
+            result["exceptionDetails"]
+        );
         result["result"]["value"].clone()
     }
 
@@ -193,8 +238,7 @@ impl Tab<'_> {
 
     fn mouse(&mut self, kind: &str, [x, y]: [f64; 2], buttons: u32) {
         let button = if kind == "mouseMoved" { "none" } else { "left" };
-        let mut params =
-            json!({ "type": kind, "x": x, "y": y, "button": button, "buttons": buttons, "clickCount": 1 });
+        let mut params = json!({ "type": kind, "x": x, "y": y, "button": button, "buttons": buttons, "clickCount": 1 });
         params["pointerType"] = self.pointer.into();
         self.call("Input.dispatchMouseEvent", params);
     }
@@ -234,7 +278,8 @@ impl Tab<'_> {
 
     /// Moves the pressed mouse along a line.
     pub fn trace(&mut self, line: &[[f64; 2]]) {
-        line.iter().for_each(|place| self.mouse("mouseMoved", *place, 1));
+        line.iter()
+            .for_each(|place| self.mouse("mouseMoved", *place, 1));
     }
 
     /// Releases the mouse button at a position.
@@ -246,7 +291,10 @@ impl Tab<'_> {
     pub fn key(&mut self, key: &str, text: &str) {
         for kind in ["keyDown", "keyUp"] {
             let text = if kind == "keyDown" { text } else { "" };
-            self.call("Input.dispatchKeyEvent", json!({ "type": kind, "key": key, "text": text }));
+            self.call(
+                "Input.dispatchKeyEvent",
+                json!({ "type": kind, "key": key, "text": text }),
+            );
         }
     }
 
@@ -266,12 +314,18 @@ impl Tab<'_> {
             Some("Log.entryAdded") => event["params"]["entry"]["level"] == "error",
             _ => false,
         };
-        self.browser.events.iter().filter(|e| own(e) && bad(e)).map(|e| e["params"].to_string()).collect()
+        self.browser
+            .events
+            .iter()
+            .filter(|e| own(e) && bad(e))
+            .map(|e| e["params"].to_string())
+            .collect()
     }
 
     pub fn close(self) {
         let id = self.id.clone();
-        self.browser.call(None, "Target.closeTarget", json!({ "targetId": id }));
+        self.browser
+            .call(None, "Target.closeTarget", json!({ "targetId": id }));
     }
 }
 

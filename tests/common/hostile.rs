@@ -7,7 +7,10 @@ pub struct Dice(u64);
 
 impl Dice {
     pub fn new(kind: usize, number: u64) -> Self {
-        Dice((kind as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ number.wrapping_mul(0xd134_2543_de82_ef95))
+        Dice(
+            (kind as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+                ^ number.wrapping_mul(0xd134_2543_de82_ef95),
+        )
     }
 
     pub fn next(&mut self) -> u64 {
@@ -110,7 +113,11 @@ pub fn value(dice: &mut Dice, value: &Value) -> Value {
 
 fn place(dice: &mut Dice, count: usize) -> usize {
     // Often near the root, where the important keys are.
-    if dice.below(2) == 0 { dice.below(count) } else { dice.below(count.min(60)) }
+    if dice.below(2) == 0 {
+        dice.below(count)
+    } else {
+        dice.below(count.min(60))
+    }
 }
 
 /// Changes one number, text or truth value in a value.
@@ -128,7 +135,9 @@ fn gently(dice: &mut Dice, value: &mut Value) {
                     }
                     Some(whole) => Value::from((whole as f64 * factor) as i64),
                     None => Value::from(
-                        number.as_f64().unwrap_or(1.0) * factor * *dice.pick(&[1.0, 1e-9, 1.0000001]),
+                        number.as_f64().unwrap_or(1.0)
+                            * factor
+                            * *dice.pick(&[1.0, 1e-9, 1.0000001]),
                     ),
                 };
                 return *found = changed;
@@ -169,8 +178,9 @@ fn node<'v>(root: &'v mut Value, number: &mut usize) -> &'v mut Value {
 }
 
 fn change(dice: &mut Dice, value: &mut Value) {
-    let deep =
-        |dice: &mut Dice| (0..1 + dice.below(300)).fold(Value::from(1), |inner, _| Value::from(vec![inner]));
+    let deep = |dice: &mut Dice| {
+        (0..1 + dice.below(300)).fold(Value::from(1), |inner, _| Value::from(vec![inner]))
+    };
     match dice.below(10) {
         0..=4 => {}
         5 => return *value = any(dice),

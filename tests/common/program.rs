@@ -81,7 +81,11 @@ impl Said {
     pub fn ended(self, code: i32, words: &[&str]) -> Self {
         assert_eq!(self.code, Some(code), "{self:#?}");
         for word in words {
-            assert!(self.err.contains(word), "expected {word:?} in:\n{}", self.err);
+            assert!(
+                self.err.contains(word),
+                "expected {word:?} in:\n{}",
+                self.err
+            );
         }
         self
     }
@@ -89,7 +93,8 @@ impl Said {
     /// Parses every line of stdout as JSON.
     #[track_caller]
     pub fn json_lines(&self) -> Vec<serde_json::Value> {
-        let read = |line: &str| serde_json::from_str(line).unwrap_or_else(|e| panic!("{e} in: {line}"));
+        let read =
+            |line: &str| serde_json::from_str(line).unwrap_or_else(|e| panic!("{e} in: {line}"));
         self.out.lines().map(read).collect()
     }
 }
@@ -133,14 +138,21 @@ impl Sandbox {
             tree(&sandbox.path(""), "")
         });
         let sandbox = Sandbox::new();
-        files.iter().for_each(|(name, content)| _ = sandbox.write(name, content));
+        files
+            .iter()
+            .for_each(|(name, content)| _ = sandbox.write(name, content));
         sandbox
     }
 
     /// Starts a run that does not end by itself and writes checkpoints all the time.
     pub fn endless(&self, out: &str) -> Child {
-        self.write("long.toml", TINY.replace("generations = 12", "generations = 10000000"));
-        self.start(&format!("evolve -q -c long.toml -o {out} --set checkpoint.seconds=0.1"))
+        self.write(
+            "long.toml",
+            TINY.replace("generations = 12", "generations = 10000000"),
+        );
+        self.start(&format!(
+            "evolve -q -c long.toml -o {out} --set checkpoint.seconds=0.1"
+        ))
     }
 
     pub fn path(&self, name: &str) -> PathBuf {
@@ -177,7 +189,11 @@ impl Sandbox {
     /// Starts the program in the background with stdout piped; blanks separate arguments.
     pub fn start(&self, args: &str) -> Child {
         let mut command = self.command(args.split_whitespace());
-        command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+        command
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap()
     }
 
     pub fn run_file(&self, folder: &str) -> RunFile {
@@ -190,18 +206,41 @@ impl Sandbox {
 pub fn write_images(sandbox: &Sandbox, prefix: &str, [height, width]: [usize; 2], seed: u8) {
     let header = |sizes: &[u32]| {
         let magic = [0, 0, 8, sizes.len() as u8];
-        [&magic[..], &sizes.iter().flat_map(|size| size.to_be_bytes()).collect::<Vec<_>>()].concat()
+        [
+            &magic[..],
+            &sizes
+                .iter()
+                .flat_map(|size| size.to_be_bytes())
+                .collect::<Vec<_>>(),
+        ]
+        .concat()
     };
     for (split, count) in [("train", 120u32), ("t10k", 24)] {
         let pixel = |image: u32, place: usize| {
             let (row, column) = (place / width, place % width);
-            let on_bar = if image % 2 == 1 { column / 2 == 2 } else { row / 2 == 2 };
-            let noise = (place as u32 + 31 * image).wrapping_mul(2_654_435_761).to_be_bytes()[0] ^ seed;
+            let on_bar = if image % 2 == 1 {
+                column / 2 == 2
+            } else {
+                row / 2 == 2
+            };
+            let noise = (place as u32 + 31 * image)
+                .wrapping_mul(2_654_435_761)
+                .to_be_bytes()[0]
+                ^ seed;
             if on_bar { 255 } else { noise / 3 }
         };
-        let pixels = (0..count).flat_map(|image| (0..height * width).map(move |place| pixel(image, place)));
-        let images = [header(&[count, height as u32, width as u32]), pixels.collect()].concat();
-        let labels = [header(&[count]), (0..count).map(|image| (image % 2) as u8).collect()].concat();
+        let pixels =
+            (0..count).flat_map(|image| (0..height * width).map(move |place| pixel(image, place)));
+        let images = [
+            header(&[count, height as u32, width as u32]),
+            pixels.collect(),
+        ]
+        .concat();
+        let labels = [
+            header(&[count]),
+            (0..count).map(|image| (image % 2) as u8).collect(),
+        ]
+        .concat();
         sandbox.write(&format!("{prefix}{split}-images-idx3-ubyte"), images);
         sandbox.write(&format!("{prefix}{split}-labels-idx1-ubyte"), labels);
     }
@@ -216,8 +255,12 @@ pub fn said(command: Command) -> Said {
 /// Runs a command that reads `input` and must end within `limit`.
 #[track_caller]
 pub fn said_of(mut command: Command, input: &str, limit: Duration) -> Said {
-    let mut child =
-        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut child = command
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
     // A command that does not read it may have ended already.
     let _ = child.stdin.take().unwrap().write_all(input.as_bytes());
     fn reader(mut pipe: impl Read + Send + 'static) -> std::thread::JoinHandle<String> {
@@ -227,7 +270,10 @@ pub fn said_of(mut command: Command, input: &str, limit: Duration) -> Said {
             String::from_utf8_lossy(&bytes).into_owned()
         })
     }
-    let (out, err) = (reader(child.stdout.take().unwrap()), reader(child.stderr.take().unwrap()));
+    let (out, err) = (
+        reader(child.stdout.take().unwrap()),
+        reader(child.stderr.take().unwrap()),
+    );
     let begin = Instant::now();
     let status = loop {
         if let Some(status) = child.try_wait().unwrap() {
@@ -240,8 +286,15 @@ pub fn said_of(mut command: Command, input: &str, limit: Duration) -> Said {
         }
         std::thread::sleep(Duration::from_millis(2));
     };
-    let said = Said { code: status.code(), out: out.join().unwrap(), err: err.join().unwrap() };
-    assert!(!said.err.contains("panicked") && said.code != Some(101), "{said:#?}");
+    let said = Said {
+        code: status.code(),
+        out: out.join().unwrap(),
+        err: err.join().unwrap(),
+    };
+    assert!(
+        !said.err.contains("panicked") && said.code != Some(101),
+        "{said:#?}"
+    );
     assert!(said.code.is_some(), "ended by a signal: {said:#?}");
     said
 }
@@ -249,21 +302,27 @@ pub fn said_of(mut command: Command, input: &str, limit: Duration) -> Said {
 /// Reports a skipped test past the harness, which hides the output of passing tests.
 #[allow(clippy::disallowed_methods)]
 pub fn skipped(why: &str) {
-    std::io::stderr().write_all(format!("SKIPPED: {why}\n").as_bytes()).unwrap();
+    std::io::stderr()
+        .write_all(format!("SKIPPED: {why}\n").as_bytes())
+        .unwrap();
 }
 
 /// Returns the MNIST folder in `MORPHCOG_DATA`; without one, reports `what` as not tested.
 pub fn mnist(what: &str) -> Option<OsString> {
     let folder = std::env::var_os("MORPHCOG_DATA").filter(|folder| !folder.is_empty());
     if folder.is_none() {
-        skipped(&format!("MORPHCOG_DATA does not name a folder with MNIST; not tested: {what}"));
+        skipped(&format!(
+            "MORPHCOG_DATA does not name a folder with MNIST; not tested: {what}"
+        ));
     }
     folder
 }
 
 /// Sends a started program the signal that Slurm sends before its time limit.
 pub fn terminate(child: &Child) {
-    let sent = Command::new("kill").args(["-s", "USR1", &child.id().to_string()]).status();
+    let sent = Command::new("kill")
+        .args(["-s", "USR1", &child.id().to_string()])
+        .status();
     assert!(sent.unwrap().success());
 }
 
@@ -272,7 +331,9 @@ pub fn terminate(child: &Child) {
 pub fn is_ignored(signal: u32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    let mask = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+    let mask = ignored
+        .and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok())
+        .unwrap_or(0);
     let is = mask >> (signal - 1) & 1 == 1;
     if is {
         skipped(&format!("signal {signal} is ignored here"));
@@ -282,17 +343,30 @@ pub fn is_ignored(signal: u32) -> bool {
 
 /// Reads all files of a folder, for comparison.
 pub fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let entries = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
     let named = |path: PathBuf| {
-        (path.file_name().unwrap().to_string_lossy().into_owned(), std::fs::read(&path).unwrap_or_default())
+        (
+            path.file_name().unwrap().to_string_lossy().into_owned(),
+            std::fs::read(&path).unwrap_or_default(),
+        )
     };
     entries.map(named).collect()
 }
 
 /// Returns `metrics.csv` without its last column, the only one that depends on the clock.
 pub fn without_seconds(metrics: &str) -> Vec<String> {
-    assert!(metrics.lines().next().is_some_and(|header| header.ends_with(",seconds")));
-    metrics.lines().map(|line| line.rsplit_once(',').unwrap().0.to_string()).collect()
+    assert!(
+        metrics
+            .lines()
+            .next()
+            .is_some_and(|header| header.ends_with(",seconds"))
+    );
+    metrics
+        .lines()
+        .map(|line| line.rsplit_once(',').unwrap().0.to_string())
+        .collect()
 }
 
 /// Returns a sandbox with runs of all pairs of three digits, in `pairs/`.
@@ -301,9 +375,13 @@ pub fn pairs() -> Sandbox {
     Sandbox::once(&PAIRS, |sandbox| {
         for [a, b] in [[0, 1], [0, 4], [1, 4]] {
             let task = format!("groups = [[{a}], [{b}]]");
-            let config = TINY.replace("groups = [[0], [1]]", &task).replace("train_images = [0, 1]", "");
+            let config = TINY
+                .replace("groups = [[0], [1]]", &task)
+                .replace("train_images = [0, 1]", "");
             sandbox.write("run.toml", config);
-            sandbox.run(&format!("evolve -q -c run.toml -o pairs/{a}v{b}")).ended(0, &[]);
+            sandbox
+                .run(&format!("evolve -q -c run.toml -o pairs/{a}v{b}"))
+                .ended(0, &[]);
         }
     })
 }

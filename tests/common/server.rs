@@ -28,7 +28,9 @@ impl Answer {
     #[track_caller]
     pub fn header(&self, name: &str) -> &str {
         let found = self.headers.iter().find(|(own, _)| own == name);
-        found.map(|(_, value)| value.as_str()).unwrap_or_else(|| panic!("no header {name} in {self:?}"))
+        found
+            .map(|(_, value)| value.as_str())
+            .unwrap_or_else(|| panic!("no header {name} in {self:?}"))
     }
 }
 
@@ -37,11 +39,20 @@ impl Server {
     pub fn start(sandbox: &Sandbox, args: &str) -> Self {
         let mut child = sandbox.start(&format!("serve --no-open {args}"));
         let mut line = String::new();
-        BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
-        let port = line.trim().strip_prefix("http://127.0.0.1:").and_then(|rest| rest.strip_suffix('/'));
-        let port =
-            port.and_then(|digits| digits.parse().ok()).unwrap_or_else(|| panic!("no address: {line:?}"));
-        Server { child: Some(child), port }
+        BufReader::new(child.stdout.take().unwrap())
+            .read_line(&mut line)
+            .unwrap();
+        let port = line
+            .trim()
+            .strip_prefix("http://127.0.0.1:")
+            .and_then(|rest| rest.strip_suffix('/'));
+        let port = port
+            .and_then(|digits| digits.parse().ok())
+            .unwrap_or_else(|| panic!("no address: {line:?}"));
+        Server {
+            child: Some(child),
+            port,
+        }
     }
 
     pub fn url(&self) -> String {
@@ -62,7 +73,9 @@ impl Server {
         let mut bytes = Vec::new();
         stream.read_to_end(&mut bytes).unwrap();
         let text = String::from_utf8(bytes).unwrap();
-        let (head, body) = text.split_once("\r\n\r\n").unwrap_or_else(|| panic!("no answer: {text:?}"));
+        let (head, body) = text
+            .split_once("\r\n\r\n")
+            .unwrap_or_else(|| panic!("no answer: {text:?}"));
         let (first, headers) = head.split_once("\r\n").unwrap();
         let header = |line: &str| {
             let (name, value) = line.split_once(": ").unwrap();
@@ -76,7 +89,10 @@ impl Server {
     }
 
     pub fn get(&self, path: &str) -> Answer {
-        self.send(format!("GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n", self.port))
+        self.send(format!(
+            "GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n",
+            self.port
+        ))
     }
 
     fn posted(&self, path: &str, body: &[u8]) -> Vec<u8> {
@@ -101,14 +117,24 @@ impl Server {
     }
 
     /// Returns the events that answer a request, as they come; dropping them closes the connection.
-    pub fn events(&self, path: &str, body: &Value) -> impl Iterator<Item = (String, Value)> + use<> {
+    pub fn events(
+        &self,
+        path: &str,
+        body: &Value,
+    ) -> impl Iterator<Item = (String, Value)> + use<> {
         let mut stream = self.connect();
-        stream.write_all(&self.posted(path, body.to_string().as_bytes())).unwrap();
+        stream
+            .write_all(&self.posted(path, body.to_string().as_bytes()))
+            .unwrap();
         let mut lines = BufReader::new(stream).lines().map(Result::unwrap);
         let status = lines.next().unwrap();
         assert_eq!(status, "HTTP/1.1 200 OK");
         let head: Vec<String> = lines.by_ref().take_while(|line| !line.is_empty()).collect();
-        assert!(head.iter().any(|line| line == "Content-Type: text/event-stream"), "{head:?}");
+        assert!(
+            head.iter()
+                .any(|line| line == "Content-Type: text/event-stream"),
+            "{head:?}"
+        );
         let mut name = String::new();
         lines.filter_map(move |line| {
             if let Some(given) = line.strip_prefix("event: ") {
@@ -123,7 +149,9 @@ impl Server {
     #[cfg(unix)]
     pub fn ended_by(mut self, signal: &str) {
         let mut child = self.child.take().unwrap();
-        let sent = std::process::Command::new("kill").args(["-s", signal, &child.id().to_string()]).status();
+        let sent = std::process::Command::new("kill")
+            .args(["-s", signal, &child.id().to_string()])
+            .status();
         assert!(sent.unwrap().success());
         let until = Instant::now() + Duration::from_secs(5);
         let status = loop {
@@ -134,8 +162,17 @@ impl Server {
             std::thread::sleep(Duration::from_millis(10));
         };
         let mut said = String::new();
-        child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
-        assert_eq!((status.code(), said.contains("panicked")), (Some(0), false), "{said}");
+        child
+            .stderr
+            .take()
+            .unwrap()
+            .read_to_string(&mut said)
+            .unwrap();
+        assert_eq!(
+            (status.code(), said.contains("panicked")),
+            (Some(0), false),
+            "{said}"
+        );
     }
 }
 
@@ -173,12 +210,15 @@ impl Proxy {
         let asked = first.split(' ').nth(1).unwrap_or_default();
         if !asked.starts_with(&format!("{}/", Proxy::PREFIX)) {
             strays.lock().unwrap().push(first);
-            let _ = (&stream)
-                .write_all(b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\nConnection: close\r\n\r\n");
+            let _ = (&stream).write_all(
+                b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\nConnection: close\r\n\r\n",
+            );
             return;
         }
         let mut server = TcpStream::connect(("127.0.0.1", to)).unwrap();
-        server.write_all(first.replacen(Proxy::PREFIX, "", 1).as_bytes()).unwrap();
+        server
+            .write_all(first.replacen(Proxy::PREFIX, "", 1).as_bytes())
+            .unwrap();
         let mut answers = server.try_clone().unwrap();
         std::thread::spawn(move || {
             let _ = std::io::copy(&mut answers, &mut &stream);

@@ -64,7 +64,10 @@ impl Source {
     fn parse(text: &str) -> Self {
         let file = syn::parse_file(text).expect("sources compile");
         let is_test = |item: &&Item| attributes(item).iter().any(is_cfg_test);
-        let mut source = Source { all: Vec::new(), code: Vec::new() };
+        let mut source = Source {
+            all: Vec::new(),
+            code: Vec::new(),
+        };
         for item in &file.items {
             add(item.to_token_stream(), &mut source.all);
             if !is_test(&item) {
@@ -101,7 +104,11 @@ fn add(tokens: TokenStream, found: &mut Vec<Token>) {
             // Comments that document are attributes.
             TokenTree::Punct(sign) if sign.as_char() == '#' => {
                 let is_doc = |group: &TokenTree| {
-                    group.to_string().trim_start_matches('[').trim_start().starts_with("doc")
+                    group
+                        .to_string()
+                        .trim_start_matches('[')
+                        .trim_start()
+                        .starts_with("doc")
                 };
                 if tokens.next_if(is_doc).is_none() {
                     found.push(Token::Sign('#'));
@@ -110,7 +117,9 @@ fn add(tokens: TokenStream, found: &mut Vec<Token>) {
             TokenTree::Punct(sign) => found.push(Token::Sign(sign.as_char())),
             TokenTree::Literal(literal) => {
                 let text = syn::parse_str::<syn::LitStr>(&literal.to_string());
-                found.push(Token::Literal(text.map_or(literal.to_string(), |text| text.value())));
+                found.push(Token::Literal(
+                    text.map_or(literal.to_string(), |text| text.value()),
+                ));
             }
             TokenTree::Group(group) => {
                 let signs = match group.delimiter() {
@@ -129,7 +138,12 @@ fn add(tokens: TokenStream, found: &mut Vec<Token>) {
 
 /// Whether these words and signs stand anywhere in this order.
 fn has(tokens: &[Token], sequence: &[&str]) -> bool {
-    let is_it = |window: &[Token]| window.iter().zip(sequence).all(|(token, word)| token.is(word));
+    let is_it = |window: &[Token]| {
+        window
+            .iter()
+            .zip(sequence)
+            .all(|(token, word)| token.is(word))
+    };
     tokens.windows(sequence.len()).any(is_it)
 }
 
@@ -139,7 +153,11 @@ fn paths(tokens: &[Token]) -> Vec<Vec<&str>> {
     let mut at = 0;
     while at + 2 < tokens.len() {
         let is_begin = tokens[at].is("crate") && tokens[at + 1].is(":") && tokens[at + 2].is(":");
-        at = if is_begin { branch(tokens, at + 3, &[], &mut found) } else { at + 1 };
+        at = if is_begin {
+            branch(tokens, at + 3, &[], &mut found)
+        } else {
+            at + 1
+        };
     }
     found
 }
@@ -157,7 +175,11 @@ fn branch<'a>(
             Some(Token::Sign('{')) => {
                 at += 1;
                 while at < tokens.len() && !tokens[at].is("}") {
-                    at = if tokens[at].is(",") { at + 1 } else { branch(tokens, at, &path, found) };
+                    at = if tokens[at].is(",") {
+                        at + 1
+                    } else {
+                        branch(tokens, at, &path, found)
+                    };
                 }
                 return at + 1;
             }
@@ -178,12 +200,19 @@ fn branch<'a>(
 }
 
 fn layer(module: &str) -> Option<u8> {
-    LAYERS.iter().find(|(name, _)| *name == module).map(|(_, layer)| *layer)
+    LAYERS
+        .iter()
+        .find(|(name, _)| *name == module)
+        .map(|(_, layer)| *layer)
 }
 
 /// What is against the plan in a file; `path` from `src`, with `/`.
 fn violations(path: &str, source: &Source) -> Vec<String> {
-    let module = path.split('/').next().unwrap_or(path).trim_end_matches(".rs");
+    let module = path
+        .split('/')
+        .next()
+        .unwrap_or(path)
+        .trim_end_matches(".rs");
     let is_top = matches!(path, "main.rs" | "lib.rs");
     let Source { all, code } = source;
     let mut found = Vec::new();
@@ -205,21 +234,33 @@ fn violations(path: &str, source: &Source) -> Vec<String> {
     if !(is_top || matches!(path, "base/mod.rs" | "body.rs")) && has(all, &["morphcog_sim"]) {
         refuse("the simulator is crate::sim".to_string());
     }
-    if path != "base/random.rs" && ["rand", "rand_pcg", "rand_core"].iter().any(|word| has(all, &[word])) {
+    if path != "base/random.rs"
+        && ["rand", "rand_pcg", "rand_core"]
+            .iter()
+            .any(|word| has(all, &[word]))
+    {
         refuse("random numbers come from base/random.rs only".to_string());
     }
     if path != "base/threads.rs" {
         let makes = |what: &&str| has(code, &["thread", ":", ":", what]);
         if ["spawn", "scope", "Builder"].iter().any(makes) || has(code, &["ThreadPoolBuilder"]) {
-            refuse("threads are made in base/threads.rs only, where none left is an error".to_string());
+            refuse(
+                "threads are made in base/threads.rs only, where none left is an error".to_string(),
+            );
         }
-        let is_parallel = has(code, &["rayon", ":", ":", "prelude"]) && WITHOUT_POOL.contains(&module);
+        let is_parallel =
+            has(code, &["rayon", ":", ":", "prelude"]) && WITHOUT_POOL.contains(&module);
         if is_parallel && !["in_pool", "install"].iter().any(|word| has(code, &[word])) {
-            refuse("rayon's own pool, which panics where no threads are left: use in_pool".to_string());
+            refuse(
+                "rayon's own pool, which panics where no threads are left: use in_pool".to_string(),
+            );
         }
     }
     if !(is_top || module == "cli") {
-        if all.iter().any(|token| matches!(token, Token::Word(word) if word.starts_with("clap"))) {
+        if all
+            .iter()
+            .any(|token| matches!(token, Token::Word(word) if word.starts_with("clap")))
+        {
             refuse("clap belongs to the command line".to_string());
         }
         // Other programs have options, too.
@@ -260,7 +301,9 @@ fn root() -> &'static Path {
 /// A path from a folder, with `/`.
 fn below(folder: &Path, path: &Path) -> String {
     let path = path.strip_prefix(folder).unwrap().components();
-    let names: Vec<_> = path.map(|part| part.as_os_str().to_string_lossy()).collect();
+    let names: Vec<_> = path
+        .map(|part| part.as_os_str().to_string_lossy())
+        .collect();
     names.join("/")
 }
 
@@ -277,7 +320,10 @@ fn every_source_file_keeps_to_the_plan() {
 /// Literals that format with a number of decimals of their own.
 fn own_decimals(source: &Source) -> Vec<&String> {
     let has_own = |text: &&String| {
-        let specs = text.split('{').skip(1).filter_map(|rest| rest.split('}').next()?.split_once(':'));
+        let specs = text
+            .split('{')
+            .skip(1)
+            .filter_map(|rest| rest.split('}').next()?.split_once(':'));
         let mut specs = specs.map(|(_, spec)| spec.trim_start_matches(['+', '>', '<']));
         specs.any(|spec| spec.starts_with('.') && !spec.ends_with('e'))
     };
@@ -298,7 +344,11 @@ fn numbers_for_people_are_made_in_one_place_where_none_is_minus_nothing() {
         let source = Source::read(&path);
         let found = own_decimals(&source);
         let is_exempt = exempt.iter().any(|name| path.ends_with(name));
-        assert!(is_exempt || found.is_empty(), "{}: base::number has it: {found:?}", path.display());
+        assert!(
+            is_exempt || found.is_empty(),
+            "{}: base::number has it: {found:?}",
+            path.display()
+        );
     }
 }
 
@@ -309,13 +359,25 @@ fn files_are_opened_in_one_place_that_refuses_pipes_and_devices() {
         source.code.windows(6).any(|window| {
             let is_call = window[0].is("fs") && window[1].is(":") && window[4].is("(");
             // What the kernel says of a process is no file of a user's.
-            let is_kernel = matches!(&window[5], Token::Literal(path) if path.starts_with("/proc/self/"));
-            is_call && !is_kernel && ["read", "read_to_string"].iter().any(|call| window[3].is(call))
+            let is_kernel =
+                matches!(&window[5], Token::Literal(path) if path.starts_with("/proc/self/"));
+            is_call
+                && !is_kernel
+                && ["read", "read_to_string"]
+                    .iter()
+                    .any(|call| window[3].is(call))
         })
     };
     assert!(opens(&Source::parse("fn f() { std::fs::read(path) }")));
-    for path in sources(&root().join("src")).into_iter().filter(|path| !path.ends_with("base/files.rs")) {
-        assert!(!opens(&Source::read(&path)), "{}: base::files has it", path.display());
+    for path in sources(&root().join("src"))
+        .into_iter()
+        .filter(|path| !path.ends_with("base/files.rs"))
+    {
+        assert!(
+            !opens(&Source::read(&path)),
+            "{}: base::files has it",
+            path.display()
+        );
     }
 }
 
@@ -323,7 +385,9 @@ fn files_are_opened_in_one_place_that_refuses_pipes_and_devices() {
 fn cycles(src: &Path) -> Vec<Vec<String>> {
     let name = |file: &PathBuf| {
         let path = below(src, file).replace('/', "::");
-        path.trim_end_matches(".rs").trim_end_matches("::mod").to_string()
+        path.trim_end_matches(".rs")
+            .trim_end_matches("::mod")
+            .to_string()
     };
     let files = sources(src);
     let modules: BTreeMap<String, usize> = files.iter().map(&name).zip(0..).collect();
@@ -336,7 +400,10 @@ fn cycles(src: &Path) -> Vec<Vec<String>> {
         resolved.filter(|used| *used != modules[&own]).collect()
     };
     let graph: Vec<Vec<usize>> = files.iter().map(uses).collect();
-    assert!(graph.iter().map(Vec::len).sum::<usize>() > files.len(), "imports are found");
+    assert!(
+        graph.iter().map(Vec::len).sum::<usize>() > files.len(),
+        "imports are found"
+    );
     let reached = |from: usize| {
         let (mut seen, mut open) = (vec![false; graph.len()], vec![from]);
         while let Some(next) = open.pop() {
@@ -351,9 +418,15 @@ fn cycles(src: &Path) -> Vec<Vec<String>> {
     let reached: Vec<Vec<bool>> = (0..graph.len()).map(reached).collect();
     let of = |number: usize| {
         let both = |other: &usize| reached[number][*other] && reached[*other][number];
-        (0..graph.len()).filter(both).map(|other| name(&files[other])).collect::<Vec<_>>()
+        (0..graph.len())
+            .filter(both)
+            .map(|other| name(&files[other]))
+            .collect::<Vec<_>>()
     };
-    let mut all: Vec<Vec<String>> = (0..graph.len()).map(of).filter(|cycle| cycle.len() > 1).collect();
+    let mut all: Vec<Vec<String>> = (0..graph.len())
+        .map(of)
+        .filter(|cycle| cycle.len() > 1)
+        .collect();
     all.sort();
     all.dedup();
     all
@@ -361,43 +434,118 @@ fn cycles(src: &Path) -> Vec<Vec<String>> {
 
 #[test]
 fn import_cycles_are_few_and_of_two_files() {
-    let all = [root().join("src"), root().join("crates/sim/src")].map(|src| cycles(&src)).concat();
-    assert!(all.len() <= 3 && all.iter().all(|cycle| cycle.len() == 2), "{all:#?}");
+    let all = [root().join("src"), root().join("crates/sim/src")]
+        .map(|src| cycles(&src))
+        .concat();
+    assert!(
+        all.len() <= 3 && all.iter().all(|cycle| cycle.len() == 2),
+        "{all:#?}"
+    );
 }
 
 #[test]
 fn the_map_in_lib_rs_has_every_module_in_its_layer() {
     let lib = std::fs::read_to_string(root().join("src/lib.rs")).unwrap();
-    let modules = lib.lines().filter_map(|line| line.strip_prefix("pub mod ")?.strip_suffix(';'));
+    let modules = lib
+        .lines()
+        .filter_map(|line| line.strip_prefix("pub mod ")?.strip_suffix(';'));
     assert!(lib.contains("[`sim`]"));
     for module in modules {
         let layer = layer(module).unwrap_or_else(|| panic!("{module} has no layer"));
-        assert!(lib.contains(&format!("//! | {layer} | [`{module}`] |")), "{module} is not in the map");
+        assert!(
+            lib.contains(&format!("//! | {layer} | [`{module}`] |")),
+            "{module} is not in the map"
+        );
     }
 }
 
 #[test]
 fn what_is_against_the_plan_is_found() {
     let found = |path: &str, source: &str| violations(path, &Source::parse(source)).len();
-    assert_eq!(found("task/score.rs", "use crate::base::Grid;\nuse crate::sim::Physics;"), 0);
-    assert_eq!(found("genome/mod.rs", "use crate::body::Body;\nuse crate::sim::World;"), 1);
+    assert_eq!(
+        found(
+            "task/score.rs",
+            "use crate::base::Grid;\nuse crate::sim::Physics;"
+        ),
+        0
+    );
+    assert_eq!(
+        found(
+            "genome/mod.rs",
+            "use crate::body::Body;\nuse crate::sim::World;"
+        ),
+        1
+    );
     assert_eq!(found("genome/mod.rs", "use morphcog_sim::World;"), 1);
     assert_eq!(found("qd/archive.rs", "use crate::genome::Genome;"), 1);
-    assert_eq!(found("qd/archive.rs", "use crate::{base::{Grid, hash}, task::score, store};"), 2);
-    assert_eq!(found("task/score.rs", "fn f() -> crate::store::Error { crate::sim::f() }"), 1);
-    assert_eq!(found("search/evolve.rs", "use crate::store::Error; use crate::draw::Scene;"), 1);
-    assert_eq!(found("search/evolve.rs", "use super::super::super::draw::Scene;"), 1);
+    assert_eq!(
+        found(
+            "qd/archive.rs",
+            "use crate::{base::{Grid, hash}, task::score, store};"
+        ),
+        2
+    );
+    assert_eq!(
+        found(
+            "task/score.rs",
+            "fn f() -> crate::store::Error { crate::sim::f() }"
+        ),
+        1
+    );
+    assert_eq!(
+        found(
+            "search/evolve.rs",
+            "use crate::store::Error; use crate::draw::Scene;"
+        ),
+        1
+    );
+    assert_eq!(
+        found("search/evolve.rs", "use super::super::super::draw::Scene;"),
+        1
+    );
     assert_eq!(found("attic/old.rs", ""), 1);
-    let hidden = "// use crate::genome::Genome;\n/* crate::store */ const X: &str = \"crate::store\";";
+    let hidden =
+        "// use crate::genome::Genome;\n/* crate::store */ const X: &str = \"crate::store\";";
     assert_eq!(found("qd/archive.rs", hidden), 0);
-    assert_eq!(found("qd/archive.rs", "const X: &str = r#\"a \"crate::store\" \"#; use crate::store::A;"), 1);
+    assert_eq!(
+        found(
+            "qd/archive.rs",
+            "const X: &str = r#\"a \"crate::store\" \"#; use crate::store::A;"
+        ),
+        1
+    );
     assert_eq!(found("task/score.rs", "use rand::Rng;"), 1);
-    let tests = "fn f() { std::thread::spawn(f); } #[cfg(test)] mod tests { fn f() { thread::scope(f) } }";
+    let tests =
+        "fn f() { std::thread::spawn(f); } #[cfg(test)] mod tests { fn f() { thread::scope(f) } }";
     assert_eq!(found("task/score.rs", tests), 1);
-    assert_eq!(found("draw/gif.rs", "use rayon::prelude::*; fn f() { a.par_iter(); }"), 1);
-    assert_eq!(found("draw/gif.rs", "use rayon::prelude::*; fn f() { in_pool(|| a.par_iter()); }"), 0);
+    assert_eq!(
+        found(
+            "draw/gif.rs",
+            "use rayon::prelude::*; fn f() { a.par_iter(); }"
+        ),
+        1
+    );
+    assert_eq!(
+        found(
+            "draw/gif.rs",
+            "use rayon::prelude::*; fn f() { in_pool(|| a.par_iter()); }"
+        ),
+        0
+    );
     assert_eq!(found("config/mod.rs", "#[derive(clap::Args)] struct A;"), 1);
-    assert_eq!(found("store/run.rs", "/// As `--out`.\nfn f() { f(\"write elsewhere with --out\") }"), 1);
-    assert_eq!(found("store/run.rs", "fn f() { format!(\"{x}: --set {y}\") }"), 1);
-    assert_eq!(found("cli/run.rs", "fn f() { f(\"write elsewhere with --out\") }"), 0);
+    assert_eq!(
+        found(
+            "store/run.rs",
+            "/// As `--out`.\nfn f() { f(\"write elsewhere with --out\") }"
+        ),
+        1
+    );
+    assert_eq!(
+        found("store/run.rs", "fn f() { format!(\"{x}: --set {y}\") }"),
+        1
+    );
+    assert_eq!(
+        found("cli/run.rs", "fn f() { f(\"write elsewhere with --out\") }"),
+        0
+    );
 }

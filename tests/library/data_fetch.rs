@@ -10,7 +10,9 @@ use morphcog::base::observer::{Observer, Work};
 use morphcog::base::session::Session;
 use morphcog::base::stop::NEVER;
 use morphcog::data::catalogue::{Catalogue, RemoteFile};
-use morphcog::data::fetch::{AttemptError, FetchError, FetchOptions, FetchOutcome, Fetched, Program};
+use morphcog::data::fetch::{
+    AttemptError, FetchError, FetchOptions, FetchOutcome, Fetched, Program,
+};
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -54,8 +56,14 @@ impl Mirror {
     }
 }
 
-fn answer(mut stream: TcpStream, files: &BTreeMap<String, (usize, Vec<u8>)>, log: &Mutex<Vec<String>>) {
-    let mut lines = BufReader::new(stream.try_clone().unwrap()).lines().map_while(Result::ok);
+fn answer(
+    mut stream: TcpStream,
+    files: &BTreeMap<String, (usize, Vec<u8>)>,
+    log: &Mutex<Vec<String>>,
+) {
+    let mut lines = BufReader::new(stream.try_clone().unwrap())
+        .lines()
+        .map_while(Result::ok);
     let Some(request) = lines.next() else { return };
     lines.take_while(|line| !line.is_empty()).for_each(drop);
     let path = request.split(' ').nth(1).unwrap_or_default().to_string();
@@ -94,7 +102,10 @@ fn catalogue(mirrors: &[&Mirror]) -> Catalogue {
 
 /// The programs that are installed: there must be one.
 fn programs() -> Vec<Program> {
-    let programs: Vec<Program> = Program::ALL.into_iter().filter(|program| program.is_installed()).collect();
+    let programs: Vec<Program> = Program::ALL
+        .into_iter()
+        .filter(|program| program.is_installed())
+        .collect();
     assert!(!programs.is_empty(), "neither curl nor wget is installed");
     programs
 }
@@ -106,11 +117,19 @@ fn fetch(
     options: &FetchOptions,
     observer: &dyn Observer,
 ) -> Result<Vec<Fetched>, FetchError> {
-    morphcog::data::fetch::fetch(catalogue, options, &[program], &Session::new(&NEVER, observer))
+    morphcog::data::fetch::fetch(
+        catalogue,
+        options,
+        &[program],
+        &Session::new(&NEVER, observer),
+    )
 }
 
 fn to(folder: &Path) -> FetchOptions {
-    FetchOptions { to: Some(folder.to_path_buf()), ..FetchOptions::default() }
+    FetchOptions {
+        to: Some(folder.to_path_buf()),
+        ..FetchOptions::default()
+    }
 }
 
 fn outcomes(fetched: Result<Vec<Fetched>, FetchError>) -> Vec<FetchOutcome> {
@@ -119,7 +138,9 @@ fn outcomes(fetched: Result<Vec<Fetched>, FetchError>) -> Vec<FetchOutcome> {
 
 fn names(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).unwrap();
-    let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    let mut names: Vec<String> = entries
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
     names.sort();
     names
 }
@@ -169,7 +190,10 @@ fn right_files_are_written_and_then_kept() {
         let again = fetch(program, &catalogue(&[&mirror]), &to(&folder), &());
         assert_eq!(outcomes(again), [FetchOutcome::Kept, FetchOutcome::Kept]);
         assert_eq!(mirror.asked().len(), 2);
-        let forced = FetchOptions { force: true, ..to(&folder) };
+        let forced = FetchOptions {
+            force: true,
+            ..to(&folder)
+        };
         fetch(program, &catalogue(&[&mirror]), &forced, &()).unwrap();
         assert_eq!(mirror.asked().len(), 4);
     }
@@ -182,11 +206,27 @@ fn a_file_that_a_mirror_lacks_comes_from_the_next() {
         let second = Mirror::serving(&[("images.gz", IMAGES), ("labels.gz", LABELS)]);
         let folder = tempfile::tempdir().unwrap();
         let log = Log::default();
-        let fetched = fetch(program, &catalogue(&[&first, &second]), &to(folder.path()), &log);
-        let url =
-            |mirror: &Mirror, name: &str| FetchOutcome::Downloaded(format!("{}/{name}", mirror.address));
-        assert_eq!(outcomes(fetched), [url(&second, "images.gz"), url(&first, "labels.gz")]);
-        assert_eq!(log.first(3), ["begins images.gz of 20", "begins images.gz of 20", "received 20"]);
+        let fetched = fetch(
+            program,
+            &catalogue(&[&first, &second]),
+            &to(folder.path()),
+            &log,
+        );
+        let url = |mirror: &Mirror, name: &str| {
+            FetchOutcome::Downloaded(format!("{}/{name}", mirror.address))
+        };
+        assert_eq!(
+            outcomes(fetched),
+            [url(&second, "images.gz"), url(&first, "labels.gz")]
+        );
+        assert_eq!(
+            log.first(3),
+            [
+                "begins images.gz of 20",
+                "begins images.gz of 20",
+                "received 20"
+            ]
+        );
     }
 }
 
@@ -202,7 +242,9 @@ fn wrong_content_is_refused_and_never_reaches_the_disk() {
         let mirrors = [&wrong, &short, &long, &cut, &absent];
         let error = fetch(program, &catalogue(&mirrors), &to(folder.path()), &()).unwrap_err();
         let message = error.to_string();
-        let FetchError::Mirrors { file, attempts, .. } = error else { panic!("{message}") };
+        let FetchError::Mirrors { file, attempts, .. } = error else {
+            panic!("{message}")
+        };
         let errors: Vec<AttemptError> = attempts.into_iter().map(|a| a.error).collect();
         assert_eq!(file, "images.gz");
         assert!(
@@ -210,17 +252,31 @@ fn wrong_content_is_refused_and_never_reaches_the_disk() {
                 errors.as_slice(),
                 [
                     AttemptError::Checksum { .. },
-                    AttemptError::Size { expected: 20, found: 13 },
-                    AttemptError::Size { expected: 20, found: 21 },
+                    AttemptError::Size {
+                        expected: 20,
+                        found: 13
+                    },
+                    AttemptError::Size {
+                        expected: 20,
+                        found: 21
+                    },
                     // Of a connection that broke off, wget says nothing.
-                    AttemptError::Failed { program: Program::Curl, .. }
-                        | AttemptError::Size { expected: 20, found: 9 },
+                    AttemptError::Failed {
+                        program: Program::Curl,
+                        ..
+                    } | AttemptError::Size {
+                        expected: 20,
+                        found: 9
+                    },
                     AttemptError::Failed { .. },
                 ]
             ),
             "{errors:?}"
         );
-        assert!(mirrors.iter().all(|m| message.contains(&m.address)), "{message}");
+        assert!(
+            mirrors.iter().all(|m| message.contains(&m.address)),
+            "{message}"
+        );
         assert!(message.contains("404"), "{message}");
         assert!(names(folder.path()).is_empty());
     }
@@ -240,9 +296,15 @@ fn another_file_of_that_name_is_not_replaced_without_force() {
         assert_eq!(names(folder.path()), ["labels.gz"]);
         assert!(mirror.asked().is_empty());
 
-        let forced = FetchOptions { force: true, ..to(folder.path()) };
+        let forced = FetchOptions {
+            force: true,
+            ..to(folder.path())
+        };
         fetch(program, &catalogue(&[&mirror]), &forced, &()).unwrap();
-        assert_eq!(std::fs::read(folder.path().join("labels.gz")).unwrap(), LABELS);
+        assert_eq!(
+            std::fs::read(folder.path().join("labels.gz")).unwrap(),
+            LABELS
+        );
     }
 }
 
@@ -252,7 +314,10 @@ fn a_mirror_of_ones_own_is_used_instead_of_the_known_ones() {
         let known = Mirror::serving(&[("images.gz", IMAGES), ("labels.gz", LABELS)]);
         let own = Mirror::serving(&[("images.gz", IMAGES), ("labels.gz", LABELS)]);
         let folder = tempfile::tempdir().unwrap();
-        let options = FetchOptions { mirror: Some(format!("{}/", own.address)), ..to(folder.path()) };
+        let options = FetchOptions {
+            mirror: Some(format!("{}/", own.address)),
+            ..to(folder.path())
+        };
         fetch(program, &catalogue(&[&known]), &options, &()).unwrap();
         assert_eq!(own.asked(), ["/set/images.gz", "/set/labels.gz"]);
         assert!(known.asked().is_empty());
@@ -262,11 +327,22 @@ fn a_mirror_of_ones_own_is_used_instead_of_the_known_ones() {
 #[test]
 fn a_dead_mirror_is_an_error_that_names_it() {
     for program in programs() {
-        let closed = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+        let closed = TcpListener::bind("127.0.0.1:0")
+            .unwrap()
+            .local_addr()
+            .unwrap();
         let folder = tempfile::tempdir().unwrap();
-        let options = FetchOptions { mirror: Some(format!("http://{closed}")), ..to(folder.path()) };
-        let error = fetch(program, &catalogue(&[]), &options, &()).unwrap_err().to_string();
-        assert!(error.contains(&closed.to_string()) && error.contains("images.gz"), "{error}");
+        let options = FetchOptions {
+            mirror: Some(format!("http://{closed}")),
+            ..to(folder.path())
+        };
+        let error = fetch(program, &catalogue(&[]), &options, &())
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains(&closed.to_string()) && error.contains("images.gz"),
+            "{error}"
+        );
     }
 }
 
@@ -285,9 +361,17 @@ fn the_published_content_is_kept_however_it_is_packed() {
 
         // One that is not packed and says something else would be as good as the one beside it.
         std::fs::write(folder.path().join("labels"), "my own").unwrap();
-        let error = fetch(program, &catalogue(&[&mirror]), &to(folder.path()), &()).unwrap_err().to_string();
-        assert!(error.contains("labels: is there but is not the published file"), "{error}");
-        let forced = FetchOptions { force: true, ..to(folder.path()) };
+        let error = fetch(program, &catalogue(&[&mirror]), &to(folder.path()), &())
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("labels: is there but is not the published file"),
+            "{error}"
+        );
+        let forced = FetchOptions {
+            force: true,
+            ..to(folder.path())
+        };
         fetch(program, &catalogue(&[&mirror]), &forced, &()).unwrap();
         assert_eq!(names(folder.path()), ["images.gz", "labels.gz"]);
     }
@@ -299,18 +383,40 @@ fn what_failed_is_said_once_and_no_empty_folder_is_left() {
         let absent = [Mirror::serving(&[]), Mirror::serving(&[])];
         let root = tempfile::tempdir().unwrap();
         let log = Log::default();
-        let error =
-            fetch(program, &catalogue(&[&absent[0], &absent[1]]), &to(&root.path().join("data/mnist")), &log);
+        let error = fetch(
+            program,
+            &catalogue(&[&absent[0], &absent[1]]),
+            &to(&root.path().join("data/mnist")),
+            &log,
+        );
         let error = error.unwrap_err().to_string();
         // Not in a port, such as 40455.
         assert_eq!(error.matches(" 404").count(), 1, "{error}");
-        assert!(absent.iter().all(|mirror| error.matches(&mirror.address).count() == 1), "{error}");
-        assert!(log.0.lock().unwrap().iter().all(|text| text.starts_with("begins")), "warned of it, too");
+        assert!(
+            absent
+                .iter()
+                .all(|mirror| error.matches(&mirror.address).count() == 1),
+            "{error}"
+        );
+        assert!(
+            log.0
+                .lock()
+                .unwrap()
+                .iter()
+                .all(|text| text.starts_with("begins")),
+            "warned of it, too"
+        );
         assert!(names(root.path()).is_empty());
 
         // What was fetched before stays.
         let half = Mirror::serving(&[("images.gz", IMAGES)]);
-        fetch(program, &catalogue(&[&half]), &to(&root.path().join("data/mnist")), &()).unwrap_err();
+        fetch(
+            program,
+            &catalogue(&[&half]),
+            &to(&root.path().join("data/mnist")),
+            &(),
+        )
+        .unwrap_err();
         assert_eq!(names(&root.path().join("data/mnist")), ["images.gz"]);
     }
 }
@@ -321,7 +427,10 @@ fn a_mirror_may_lead_elsewhere() {
         let last = Mirror::serving(&[("images.gz", IMAGES), ("labels.gz", LABELS)]);
         let there = |name: &str| format!("{}/{name}", last.address);
         let [images, labels] = [there("images.gz"), there("labels.gz")];
-        let first = Mirror::serving(&[("images.gz", images.as_bytes()), ("labels.gz", labels.as_bytes())]);
+        let first = Mirror::serving(&[
+            ("images.gz", images.as_bytes()),
+            ("labels.gz", labels.as_bytes()),
+        ]);
         let folder = tempfile::tempdir().unwrap();
         fetch(program, &catalogue(&[&first]), &to(folder.path()), &()).unwrap();
         assert_eq!(names(folder.path()), ["images.gz", "labels.gz"]);
@@ -334,14 +443,32 @@ fn only_addresses_of_the_web_are_asked_for_and_none_is_an_option() {
         let root = tempfile::tempdir().unwrap();
         std::fs::write(root.path().join("images.gz"), IMAGES).unwrap();
         let here = format!("file://{}", root.path().display());
-        for mirror in [here.as_str(), "ftp://127.0.0.1", "-o/tmp", "--version", "127.0.0.1:1", ""] {
+        for mirror in [
+            here.as_str(),
+            "ftp://127.0.0.1",
+            "-o/tmp",
+            "--version",
+            "127.0.0.1:1",
+            "",
+        ] {
             let folder = root.path().join("to");
-            let options = FetchOptions { mirror: Some(mirror.to_string()), ..to(&folder) };
+            let options = FetchOptions {
+                mirror: Some(mirror.to_string()),
+                ..to(&folder)
+            };
             let error = fetch(program, &catalogue(&[]), &options, &()).unwrap_err();
             let message = error.to_string();
-            let FetchError::Mirrors { attempts, .. } = error else { panic!("{message}") };
-            assert!(matches!(attempts[0].error, AttemptError::Address), "{message}");
-            assert!(message.contains("https://") && !folder.exists(), "{message}");
+            let FetchError::Mirrors { attempts, .. } = error else {
+                panic!("{message}")
+            };
+            assert!(
+                matches!(attempts[0].error, AttemptError::Address),
+                "{message}"
+            );
+            assert!(
+                message.contains("https://") && !folder.exists(),
+                "{message}"
+            );
         }
     }
 }
@@ -350,13 +477,17 @@ fn only_addresses_of_the_web_are_asked_for_and_none_is_an_option() {
 /// whether it went before the server did.
 fn client_leaves(listener: &TcpListener, endless: &[u8]) -> bool {
     let (mut stream, _) = listener.accept().unwrap();
-    stream.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
+    stream
+        .set_read_timeout(Some(Duration::from_secs(10)))
+        .unwrap();
     let mut lines = BufReader::new(stream.try_clone().unwrap()).lines();
     while lines.next().is_some_and(|line| !line.unwrap().is_empty()) {}
     if endless.is_empty() {
         return stream.read(&mut [0]).is_ok_and(|read| read == 0);
     }
-    stream.write_all(b"HTTP/1.1 200 OK\r\nConnection: close\r\n\r\n").unwrap();
+    stream
+        .write_all(b"HTTP/1.1 200 OK\r\nConnection: close\r\n\r\n")
+        .unwrap();
     (0..1_000_000).any(|_| stream.write_all(endless).is_err())
 }
 
@@ -372,7 +503,10 @@ fn a_file_without_end_is_not_read_to_its_end() {
         std::thread::scope(|scope| {
             let server = scope.spawn(|| client_leaves(&listener, &[0; 1 << 16]));
             let error = fetch(program, &catalogue(&[]), &options(folder.path()), &()).unwrap_err();
-            assert!(error.to_string().contains("expected 20 bytes, found more"), "{error}");
+            assert!(
+                error.to_string().contains("expected 20 bytes, found more"),
+                "{error}"
+            );
             assert!(server.join().unwrap());
         });
     }
@@ -384,7 +518,10 @@ fn a_download_that_is_stopped_leaves_no_folder_and_no_process() {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let mirror = Some(format!("http://{}", listener.local_addr().unwrap()));
         let root = tempfile::tempdir().unwrap();
-        let options = FetchOptions { mirror, ..to(&root.path().join("data/mnist")) };
+        let options = FetchOptions {
+            mirror,
+            ..to(&root.path().join("data/mnist"))
+        };
         let stop = AtomicBool::new(false);
         std::thread::scope(|scope| {
             let server = scope.spawn(|| client_leaves(&listener, &[]));
@@ -412,7 +549,10 @@ fn without_a_program_for_downloads_what_to_fetch_by_hand_is_said() {
     command.env("PATH", sandbox.path("nothing"));
     let said = said(command).ended(1, &["curl", "wget", "data/mnist yourself", "builtin"]);
     for remote in Catalogue::named("mnist").unwrap().files {
-        assert!(said.err.contains(&format!("https://ossci-datasets.s3.amazonaws.com/mnist/{}", remote.name)));
+        assert!(said.err.contains(&format!(
+            "https://ossci-datasets.s3.amazonaws.com/mnist/{}",
+            remote.name
+        )));
     }
     assert!(names(&sandbox.path("")).is_empty());
 
@@ -421,7 +561,8 @@ fn without_a_program_for_downloads_what_to_fetch_by_hand_is_said() {
     std::fs::write(sandbox.path("own/images.gz"), IMAGES).unwrap();
     std::fs::write(sandbox.path("own/labels.gz"), LABELS).unwrap();
     let there = catalogue(&[]);
-    let kept = morphcog::data::fetch::fetch(&there, &to(&sandbox.path("own")), &[], &Session::default());
+    let kept =
+        morphcog::data::fetch::fetch(&there, &to(&sandbox.path("own")), &[], &Session::default());
     assert_eq!(outcomes(kept), [FetchOutcome::Kept, FetchOutcome::Kept]);
 }
 
@@ -434,7 +575,9 @@ fn settings_of_curl_do_not_send_a_file_elsewhere() {
     sandbox.write(".curlrc", "output = elsewhere\nhead\n");
     let mirror = Mirror::serving(&[("train-images-idx3-ubyte.gz", IMAGES)]);
     let mut command = sandbox.command(["data", "fetch", "--mirror", &mirror.address]);
-    command.env("HOME", sandbox.path("")).env("CURL_HOME", sandbox.path(""));
+    command
+        .env("HOME", sandbox.path(""))
+        .env("CURL_HOME", sandbox.path(""));
     said(command).ended(1, &["expected 9912422 bytes, found 20"]);
     assert_eq!(names(&sandbox.path("")), [".curlrc"]);
 }

@@ -32,22 +32,44 @@ fn a_whole_set_is_read_as_the_mnist_crate_reads_it() {
     let folder = tempfile::tempdir().unwrap();
     for (stem, count, seed) in [("train", 60_000u32, 1), ("t10k", 10_000, 2)] {
         let pixels = noise((count * SIDE * SIDE) as usize, seed);
-        let labels: Vec<u8> = noise(count as usize, seed + 10).iter().map(|b| b % 10).collect();
+        let labels: Vec<u8> = noise(count as usize, seed + 10)
+            .iter()
+            .map(|b| b % 10)
+            .collect();
         let path = |rest: &str| folder.path().join(format!("{stem}-{rest}"));
-        write(&path("images-idx3-ubyte"), 2051, &[count, SIDE, SIDE], &pixels);
+        write(
+            &path("images-idx3-ubyte"),
+            2051,
+            &[count, SIDE, SIDE],
+            &pixels,
+        );
         write(&path("labels-idx1-ubyte"), 2049, &[count], &labels);
     }
-    let theirs =
-        mnist::MnistBuilder::new().base_path(folder.path().to_str().unwrap()).label_format_digit().finalize();
-    let ours = Dataset::load("mnist", &places(Some(folder.path()), None, None), &Split::ALL).unwrap();
+    let theirs = mnist::MnistBuilder::new()
+        .base_path(folder.path().to_str().unwrap())
+        .label_format_digit()
+        .finalize();
+    let ours = Dataset::load(
+        "mnist",
+        &places(Some(folder.path()), None, None),
+        &Split::ALL,
+    )
+    .unwrap();
     for (split, count, pixels, labels) in [
         (Split::Train, 60_000, &theirs.trn_img, &theirs.trn_lbl),
         (Split::Test, 10_000, &theirs.tst_img, &theirs.tst_lbl),
     ] {
         assert_eq!((ours.len(split), labels.len()), (count, count));
-        for (index, (image, label)) in pixels.chunks((SIDE * SIDE) as usize).zip(labels).enumerate() {
+        for (index, (image, label)) in pixels
+            .chunks((SIDE * SIDE) as usize)
+            .zip(labels)
+            .enumerate()
+        {
             assert_eq!(ours.label(split, index).unwrap(), *label, "{split} {index}");
-            assert!(ours.image(split, index).unwrap().cells() == image, "{split} {index}");
+            assert!(
+                ours.image(split, index).unwrap().cells() == image,
+                "{split} {index}"
+            );
         }
     }
 }
@@ -59,8 +81,13 @@ fn the_real_test_set_has_its_published_class_counts() {
     };
     let given = places(None, Some(folder), None);
     let data = Dataset::load("mnist", &given, &[Split::Test]).unwrap();
-    let counts: Vec<usize> = (0..10).map(|class| data.indices_of(Split::Test, class).len()).collect();
-    assert_eq!(counts, [980, 1135, 1032, 1010, 982, 892, 958, 1028, 974, 1009]);
+    let counts: Vec<usize> = (0..10)
+        .map(|class| data.indices_of(Split::Test, class).len())
+        .collect();
+    assert_eq!(
+        counts,
+        [980, 1135, 1032, 1010, 982, 892, 958, 1028, 974, 1009]
+    );
     assert_eq!(data.len(Split::Test), 10_000);
 }
 

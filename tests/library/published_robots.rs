@@ -41,8 +41,17 @@ fn stimuli() -> Option<Vec<Grid<f64>>> {
         ..StimulusParams::default()
     };
     let see = |(digit, &index): (usize, &usize)| {
-        assert_eq!(usize::from(mnist.label(Split::Train, index).unwrap()), digit);
-        stimulus(&mnist.image(Split::Train, index).unwrap(), 14, 14, &saturated).unwrap()
+        assert_eq!(
+            usize::from(mnist.label(Split::Train, index).unwrap()),
+            digit
+        );
+        stimulus(
+            &mnist.image(Split::Train, index).unwrap(),
+            14,
+            14,
+            &saturated,
+        )
+        .unwrap()
     };
     Some(IMAGES.iter().enumerate().map(see).collect())
 }
@@ -50,13 +59,20 @@ fn stimuli() -> Option<Vec<Grid<f64>>> {
 /// Displacements under the protocol of the robot's task.
 fn displacements(robot: &Published, stimuli: &[Grid<f64>], physics: &Physics) -> Vec<f64> {
     let system = Arc::new(System::new(&robot.body, physics.clone()));
-    let protocol =
-        |rollout, control_steps| Protocol { rollout, control_steps, start_row: 2, start_column: 493 };
+    let protocol = |rollout, control_steps| Protocol {
+        rollout,
+        control_steps,
+        start_row: 2,
+        start_column: 493,
+    };
     match robot.task.as_str() {
         "zero_one" => {
             let protocol = protocol(RolloutMode::Sequential, 500);
             let mut rollout = Rollout::new(&system, &protocol);
-            stimuli[..2].iter().map(|stimulus| rollout.show(stimulus, |_| ()).unwrap()).collect()
+            stimuli[..2]
+                .iter()
+                .map(|stimulus| rollout.show(stimulus, |_| ()).unwrap())
+                .collect()
         }
         "four_digit" => {
             let protocol = protocol(RolloutMode::Fresh, 250);
@@ -84,7 +100,9 @@ fn every_published_robot_walks_as_evogym_has_it_walk() {
             let margin = (high - low) + 0.1 + 0.05 * low.abs().max(high.abs());
             println!("{name} image {image}: {d:.4}, EvoGym {low} to {high}");
             if !(low - margin..=high + margin).contains(d) {
-                wrong.push(format!("{name} image {image}: {d}, expected {low} to {high} ± {margin}"));
+                wrong.push(format!(
+                    "{name} image {image}: {d}, expected {low} to {high} ± {margin}"
+                ));
             }
         }
     }
@@ -110,12 +128,21 @@ fn the_built_in_gallery_holds_these_very_robots() {
     assert_eq!(gallery.len(), 5);
     for shipped in gallery {
         let published = &robots[&shipped.name];
-        assert_eq!((&shipped.body, shipped.fitness), (&published.body, published.published_fitness));
+        assert_eq!(
+            (&shipped.body, shipped.fitness),
+            (&published.body, published.published_fitness)
+        );
         assert_eq!(published.task, "zero_one");
     }
     let config = published::config().unwrap();
-    assert_eq!((config.protocol.rollout, config.protocol.control_steps), (RolloutMode::Sequential, 500));
-    assert_eq!((config.protocol.start_row, config.protocol.start_column), (2, 493));
+    assert_eq!(
+        (config.protocol.rollout, config.protocol.control_steps),
+        (RolloutMode::Sequential, 500)
+    );
+    assert_eq!(
+        (config.protocol.start_row, config.protocol.start_column),
+        (2, 493)
+    );
     assert_eq!(config.data.train_images.as_deref(), Some(&IMAGES[..2]));
     assert_eq!(config.physics, Physics::default());
 }
@@ -127,16 +154,35 @@ fn the_published_robots_answer_test_images() {
     };
     let sandbox = Sandbox::new();
     let data = std::fs::canonicalize(data).unwrap();
-    let args = ["eval", "-q", "--robots", "qmaxd,YJTLA", "--images", "40", "--data"];
+    let args = [
+        "eval",
+        "-q",
+        "--robots",
+        "qmaxd,YJTLA",
+        "--images",
+        "40",
+        "--data",
+    ];
     let mut command = sandbox.command(args);
     command.arg(data);
     said(command).ended(0, &[]);
     let report = EvalFile::read(&sandbox.path("gallery-eval.json")).unwrap();
-    let names: Vec<&str> = report.robots.iter().map(|robot| robot.id.as_str()).collect();
+    let names: Vec<&str> = report
+        .robots
+        .iter()
+        .map(|robot| robot.id.as_str())
+        .collect();
     assert_eq!(names, ["QMAXD", "YJTLA"]);
     // 97.2 and 88.7 % of 1000 images.
-    assert!(report.robots.iter().all(|robot| robot.right >= 30), "{:?}", report.means);
+    assert!(
+        report.robots.iter().all(|robot| robot.right >= 30),
+        "{:?}",
+        report.means
+    );
     // Which way a zero is to be answered is known of them.
-    let walks = report.robots.iter().map(|robot| robot.first_group_walks.as_str());
+    let walks = report
+        .robots
+        .iter()
+        .map(|robot| robot.first_group_walks.as_str());
     assert_eq!(walks.collect::<Vec<_>>(), ["right", "left"]);
 }

@@ -43,12 +43,30 @@ fn every_trained_robot_is_physical_and_was_tested_on_1000_images() {
         let run = RunFile::read(&folder.join("run.json")).unwrap();
         let eval = EvalFile::read(&folder.join("eval.json")).unwrap();
         let audit = AuditFile::read(&folder.join("audit.json")).unwrap();
-        let [robot] = &run.elites[..] else { panic!("{}: {} robots", folder.display(), run.elites.len()) };
-        let [tested] = &eval.robots[..] else { panic!("{}", folder.display()) };
-        assert_eq!((&tested.id, eval.images.len()), (&robot.id, 1000), "{}", folder.display());
-        assert_eq!(eval.runs[0].sha256, run.fingerprint(), "{}", folder.display());
+        let [robot] = &run.elites[..] else {
+            panic!("{}: {} robots", folder.display(), run.elites.len())
+        };
+        let [tested] = &eval.robots[..] else {
+            panic!("{}", folder.display())
+        };
+        assert_eq!(
+            (&tested.id, eval.images.len()),
+            (&robot.id, 1000),
+            "{}",
+            folder.display()
+        );
+        assert_eq!(
+            eval.runs[0].sha256,
+            run.fingerprint(),
+            "{}",
+            folder.display()
+        );
         assert_eq!(audit.run_sha256, run.fingerprint(), "{}", folder.display());
-        assert!(audit.robot(&robot.id).unwrap().is_physical(), "{}", folder.display());
+        assert!(
+            audit.robot(&robot.id).unwrap().is_physical(),
+            "{}",
+            folder.display()
+        );
         assert!(run.origin.is_some(), "{}", folder.display());
     }
 }
@@ -68,9 +86,14 @@ fn walks_of(run: &RunFile, body: &Body, mnist: &Dataset, images: &[ImageRef]) ->
     let stimulus = |image: &ImageRef| see(&run.config, mnist, Split::Test, image.index).unwrap();
     let stimuli: Vec<Grid<f64>> = images.iter().map(stimulus).collect();
     let control_steps = CYCLES * run.config.physics.cycle_steps;
-    let protocol = Protocol { rollout: RolloutMode::Fresh, control_steps, ..run.config.protocol.clone() };
+    let protocol = Protocol {
+        rollout: RolloutMode::Fresh,
+        control_steps,
+        ..run.config.protocol.clone()
+    };
     let setting = (&run.config.physics, &protocol);
-    let (walks, _) = fresh_rollouts(body, &stimuli, &[], setting, &|_| (), &Session::default()).unwrap();
+    let (walks, _) =
+        fresh_rollouts(body, &stimuli, &[], setting, &|_| (), &Session::default()).unwrap();
     walks.into_iter().map(Result::ok).collect()
 }
 
@@ -85,11 +108,14 @@ fn they_walk_to_the_bit_as_in_their_test() {
             seen[usize::from(label)] += 1;
             seen[usize::from(label)] <= SHOWN
         };
-        let shown: Vec<usize> =
-            (0..eval.images.len()).filter(|place| is_first(eval.images[*place].label, &mut seen)).collect();
+        let shown: Vec<usize> = (0..eval.images.len())
+            .filter(|place| is_first(eval.images[*place].label, &mut seen))
+            .collect();
         let images: Vec<ImageRef> = shown.iter().map(|place| eval.images[*place]).collect();
-        let known: Vec<Option<f64>> =
-            shown.iter().map(|place| eval.robots[0].displacements[*place]).collect();
+        let known: Vec<Option<f64>> = shown
+            .iter()
+            .map(|place| eval.robots[0].displacements[*place])
+            .collect();
         assert_eq!(walks(&run, &mnist, &images), known, "{}", folder.display());
     }
 }
@@ -102,12 +128,19 @@ fn the_baselines_beside_them_are_those_that_eval_finds_today() {
     // One of them: the rule is the same for all.
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/four_digit/2v013");
     let sandbox = Sandbox::new();
-    let mut command =
-        sandbox.command(["eval", "--quiet", "--cycles", "1", "--out", "eval.json", "--archive"]);
+    let mut command = sandbox.command([
+        "eval",
+        "--quiet",
+        "--cycles",
+        "1",
+        "--out",
+        "eval.json",
+        "--archive",
+    ]);
     command.arg(&folder).arg("--data").arg(&data);
     said(command).ended(0, &[]);
-    let [then, now] =
-        [folder.join("eval.json"), sandbox.path("eval.json")].map(|file| EvalFile::read(&file).unwrap());
+    let [then, now] = [folder.join("eval.json"), sandbox.path("eval.json")]
+        .map(|file| EvalFile::read(&file).unwrap());
     assert_eq!((then.images, then.baselines), (now.images, now.baselines));
 }
 
@@ -116,13 +149,24 @@ fn the_team_that_ships_walks_and_answers_as_in_its_test() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/team");
     let team = TeamFile::read(&root.join("team.json")).unwrap();
     let votes = &team.answers.as_ref().expect("it was not stopped").votes;
-    let right = team.images.iter().zip(&votes.answers).filter(|(image, answer)| image.label == **answer);
+    let right = team
+        .images
+        .iter()
+        .zip(&votes.answers)
+        .filter(|(image, answer)| image.label == **answer);
     assert_eq!(right.count(), votes.accuracy.right);
-    assert_eq!((team.members.len(), team.size, team.classes.len()), (45, 45, 10));
+    assert_eq!(
+        (team.members.len(), team.size, team.classes.len()),
+        (45, 45, 10)
+    );
     let mnist = mnist();
     for (number, member) in team.members.iter().enumerate() {
-        let run = RunFile::read(&root.join(member.task.replace('|', "v")).join("run.json")).unwrap();
-        assert_eq!((run.fingerprint(), &run.elites[0].id), (member.run_sha256.clone(), &member.id));
+        let run =
+            RunFile::read(&root.join(member.task.replace('|', "v")).join("run.json")).unwrap();
+        assert_eq!(
+            (run.fingerprint(), &run.elites[0].id),
+            (member.run_sha256.clone(), &member.id)
+        );
         if let Some(mnist) = &mnist {
             // Another image for each.
             let place = number * 7 % team.images.len();
@@ -140,14 +184,19 @@ fn the_robots_of_the_atlas_are_audited_and_walk_as_in_the_test_of_the_paper_s_ta
     let mut tasks = 0;
     for set in ["zero_one", "four_digit"] {
         // Tests run in the project's folder, where the atlas is looked for.
-        let of_seed =
-            |seed: usize| RunFile::read(Path::new(&format!("atlas:{set}-{seed}/run.json"))).unwrap();
+        let of_seed = |seed: usize| {
+            RunFile::read(Path::new(&format!("atlas:{set}-{seed}/run.json"))).unwrap()
+        };
         let runs: Vec<RunFile> = (1..=5).map(of_seed).collect();
         let eval = EvalFile::read(Path::new(&format!("atlas:{set}/eval.json"))).unwrap();
         let hashes = eval.runs.iter().map(|run| run.sha256.clone());
         assert!(hashes.eq(runs.iter().map(RunFile::fingerprint)), "{set}");
         let audit = |seed: usize| {
-            AuditFile::of_run(&runs[seed - 1], Path::new(&format!("atlas:{set}-{seed}/audit.json"))).unwrap()
+            AuditFile::of_run(
+                &runs[seed - 1],
+                Path::new(&format!("atlas:{set}-{seed}/audit.json")),
+            )
+            .unwrap()
         };
         let audits: Vec<AuditFile> = (1..=5).map(audit).collect();
         for (number, robot) in eval.robots.iter().enumerate() {
@@ -155,7 +204,11 @@ fn the_robots_of_the_atlas_are_audited_and_walk_as_in_the_test_of_the_paper_s_ta
             if let Some(mnist) = &mnist {
                 // Another image for each.
                 let (run, place) = (&runs[robot.run], number * 7 % eval.images.len());
-                let elite = run.elites.iter().find(|elite| elite.id == robot.id).unwrap();
+                let elite = run
+                    .elites
+                    .iter()
+                    .find(|elite| elite.id == robot.id)
+                    .unwrap();
                 let walked = walks_of(run, &elite.body, mnist, &eval.images[place..=place]);
                 assert_eq!(walked, [robot.displacements[place]], "{}", robot.id);
             }
@@ -170,7 +223,10 @@ fn the_robots_of_the_atlas_are_audited_and_walk_as_in_the_test_of_the_paper_s_ta
                 .collect();
             if !of_task.is_empty() {
                 let mean = 100.0 * of_task.iter().sum::<f64>() / of_task.len() as f64;
-                assert!((mean - cells[4].parse::<f64>().unwrap()).abs() < 1e-9, "{line}");
+                assert!(
+                    (mean - cells[4].parse::<f64>().unwrap()).abs() < 1e-9,
+                    "{line}"
+                );
                 tasks += 1;
             }
         }

@@ -18,15 +18,27 @@ fn sandbox() -> Sandbox {
     Sandbox::once(&RUNS, |sandbox| {
         sandbox.write("tiny.toml", TINY);
         for seed in [3, 4] {
-            sandbox.run(&format!("evolve -q -c tiny.toml --seed {seed} -o runs/{seed}")).ended(0, &[]);
+            sandbox
+                .run(&format!(
+                    "evolve -q -c tiny.toml --seed {seed} -o runs/{seed}"
+                ))
+                .ended(0, &[]);
         }
         let archives = "--archive runs/3/run.json runs/4/run.json";
-        sandbox.run(&format!("eval -q {archives} --images 40 --cycles 1 --robots top:4")).ended(0, &[]);
+        sandbox
+            .run(&format!(
+                "eval -q {archives} --images 40 --cycles 1 --robots top:4"
+            ))
+            .ended(0, &[]);
     })
 }
 
 fn capacity(sandbox: &Sandbox, options: &str) -> CapacityFile {
-    sandbox.run(&format!("capacity -q --eval runs/eval.json {FEW} {options}")).ended(0, &[]);
+    sandbox
+        .run(&format!(
+            "capacity -q --eval runs/eval.json {FEW} {options}"
+        ))
+        .ended(0, &[]);
     CapacityFile::read(&sandbox.path("runs/capacity.json")).unwrap()
 }
 
@@ -34,22 +46,42 @@ fn capacity(sandbox: &Sandbox, options: &str) -> CapacityFile {
 fn several_archives_are_evaluated_together_above_their_folders() {
     let sandbox = sandbox();
     let report = EvalFile::read(&sandbox.path("runs/eval.json")).unwrap();
-    assert_eq!(report.runs.iter().map(|run| run.seed).collect::<Vec<_>>(), [3, 4]);
+    assert_eq!(
+        report.runs.iter().map(|run| run.seed).collect::<Vec<_>>(),
+        [3, 4]
+    );
     assert_eq!(report.robots.len(), 4);
     // The fittest of both, not those of each.
     let mut all: Vec<(f64, usize)> = ["runs/3", "runs/4"]
         .iter()
         .enumerate()
         .flat_map(|(number, run)| {
-            sandbox.run_file(run).elites.into_iter().map(move |elite| (elite.objective, number))
+            sandbox
+                .run_file(run)
+                .elites
+                .into_iter()
+                .map(move |elite| (elite.objective, number))
         })
         .collect();
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let tested: Vec<(f64, usize)> = report.robots.iter().map(|robot| (robot.objective, robot.run)).collect();
+    let tested: Vec<(f64, usize)> = report
+        .robots
+        .iter()
+        .map(|robot| (robot.objective, robot.run))
+        .collect();
     assert_eq!(tested, all[..4]);
-    assert!(sandbox.read("runs/eval.csv").lines().nth(1).unwrap().contains(",0|1,"));
+    assert!(
+        sandbox
+            .read("runs/eval.csv")
+            .lines()
+            .nth(1)
+            .unwrap()
+            .contains(",0|1,")
+    );
     // What is shown and where they live must be the same.
-    sandbox.run("evolve -q -c tiny.toml --set protocol.control_steps=21 -o runs/5").ended(0, &[]);
+    sandbox
+        .run("evolve -q -c tiny.toml --set protocol.control_steps=21 -o runs/5")
+        .ended(0, &[]);
     sandbox
         .run("eval --archive runs/3/run.json --archive runs/5/run.json --images 4 -o x.json")
         .ended(3, &["runs/5/run.json", "[protocol]", "runs/3/run.json"]);
@@ -58,19 +90,34 @@ fn several_archives_are_evaluated_together_above_their_folders() {
 #[test]
 fn robots_that_know_less_than_the_smallest_network_are_worth_less_than_it() {
     let sandbox = sandbox();
-    let mut report: serde_json::Value = serde_json::from_str(&sandbox.read("runs/eval.json")).unwrap();
+    let mut report: serde_json::Value =
+        serde_json::from_str(&sandbox.read("runs/eval.json")).unwrap();
     for robot in report["robots"].as_array_mut().unwrap() {
         (robot["right"], robot["accuracy"]) = (1.into(), 0.025.into());
     }
     report["means"]["0|1"]["accuracy"] = 0.025.into();
     sandbox.write("runs/eval.json", report.to_string());
-    let said = sandbox.run(&format!("capacity --eval runs/eval.json {FEW} --set sizes.1=2")).ended(0, &[]);
-    let row = said.out.lines().find(|line| line.starts_with("0|1")).unwrap();
+    let said = sandbox
+        .run(&format!(
+            "capacity --eval runs/eval.json {FEW} --set sizes.1=2"
+        ))
+        .ended(0, &[]);
+    let row = said
+        .out
+        .lines()
+        .find(|line| line.starts_with("0|1"))
+        .unwrap();
     assert_eq!(row.matches("< 2").count(), 2, "{row}");
-    let found: serde_json::Value = serde_json::from_str(&sandbox.read("runs/capacity.json")).unwrap();
-    assert_eq!(found["tasks"][0]["curves"][1]["capacity"], serde_json::json!({ "below": 2.0 }));
+    let found: serde_json::Value =
+        serde_json::from_str(&sandbox.read("runs/capacity.json")).unwrap();
+    assert_eq!(
+        found["tasks"][0]["curves"][1]["capacity"],
+        serde_json::json!({ "below": 2.0 })
+    );
     assert!(sandbox.read("runs/capacity.svg").contains("&lt; 2"));
-    sandbox.run("report -q --archive runs/3 runs/4 --rollouts 0 -o runs/page.html").ended(0, &[]);
+    sandbox
+        .run("report -q --archive runs/3 runs/4 --rollouts 0 -o runs/page.html")
+        .ended(0, &[]);
     assert!(sandbox.read("runs/page.html").contains(">&lt; 2<"));
 }
 
@@ -79,10 +126,25 @@ fn networks_are_trained_once_and_the_same_on_any_number_of_threads() {
     let sandbox = sandbox();
     let first = capacity(&sandbox, "--threads 1");
     let task = &first.tasks[0];
-    assert_eq!((task.task.as_str(), task.robots, task.curves.len()), ("0|1", 4, 2));
+    assert_eq!(
+        (task.task.as_str(), task.robots, task.curves.len()),
+        ("0|1", 4, 2)
+    );
     for curve in &task.curves {
-        assert_eq!(curve.points.iter().map(|point| point.size).collect::<Vec<_>>(), [1, 2, 3, 4]);
-        assert!(curve.points.iter().all(|point| (0.0..=1.0).contains(&point.mean)));
+        assert_eq!(
+            curve
+                .points
+                .iter()
+                .map(|point| point.size)
+                .collect::<Vec<_>>(),
+            [1, 2, 3, 4]
+        );
+        assert!(
+            curve
+                .points
+                .iter()
+                .all(|point| (0.0..=1.0).contains(&point.mean))
+        );
         assert!(curve.points.is_sorted_by_key(|point| point.parameters) && curve.fit.is_some());
     }
     // 25 pixels: (25 + 1)·size + (size + 1)·2 parameters.
@@ -93,12 +155,17 @@ fn networks_are_trained_once_and_the_same_on_any_number_of_threads() {
     assert_eq!(capacity(&sandbox, "--threads 3"), first);
     assert_eq!(sandbox.read("runs/capacity.trainings.json"), trainings);
     // More trainings go on from those there are; another setting begins anew.
-    let more = sandbox.run("capacity --json --eval runs/eval.json --set trainings=4 --set sizes=[1,4]");
+    let more =
+        sandbox.run("capacity --json --eval runs/eval.json --set trainings=4 --set sizes=[1,4]");
     assert!(more.ended(0, &[]).out.contains("\"capacity\""));
     let other = capacity(&sandbox, "--set mlp.learning_rate=0.01");
     assert_ne!(other.tasks[0].curves[0], first.tasks[0].curves[0]);
     assert_eq!(other.tasks[0].curves[1], first.tasks[0].curves[1]);
-    assert!(sandbox.read("runs/capacity.csv").starts_with("task,network,size,parameters,mean,"));
+    assert!(
+        sandbox
+            .read("runs/capacity.csv")
+            .starts_with("task,network,size,parameters,mean,")
+    );
 }
 
 #[test]
@@ -107,12 +174,24 @@ fn an_evaluation_shows_the_capacity_of_its_robots_and_of_no_others() {
     let known = capacity(&sandbox, "").tasks[0].size_of("mlp").unwrap();
     let eval = |robots: &str| {
         let archives = "--archive runs/3/run.json runs/4/run.json";
-        sandbox.run(&format!("eval {archives} --images 40 --cycles 1 --robots {robots}")).ended(0, &[]).out
+        sandbox
+            .run(&format!(
+                "eval {archives} --images 40 --cycles 1 --robots {robots}"
+            ))
+            .ended(0, &[])
+            .out
     };
     let same = eval("top:4");
-    let row = same.lines().skip_while(|line| !line.contains("MLP neurons")).nth(2).unwrap();
+    let row = same
+        .lines()
+        .skip_while(|line| !line.contains("MLP neurons"))
+        .nth(2)
+        .unwrap();
     let known = known.map_or("no match".to_string(), |size| format!("{size:.1}"));
-    assert!(row.starts_with("0|1") && row.contains(&known), "{row} ({known})");
+    assert!(
+        row.starts_with("0|1") && row.contains(&known),
+        "{row} ({known})"
+    );
     assert!(!eval("top:3").contains("MLP neurons"));
 }
 
@@ -121,7 +200,10 @@ fn clean_training_never_waits_on_the_test_images() {
     let sandbox = sandbox();
     let published = capacity(&sandbox, "");
     let clean = capacity(&sandbox, "--clean --set waiting_images=60");
-    assert_eq!((published.patience_on.as_str(), clean.patience_on.as_str()), ("test", "validation"));
+    assert_eq!(
+        (published.patience_on.as_str(), clean.patience_on.as_str()),
+        ("test", "validation")
+    );
     assert_ne!(clean.tasks, published.tasks);
 }
 
@@ -138,24 +220,42 @@ fn what_cannot_be_compared_is_refused() {
     with("--physical-only").ended(3, &["audit.json", "morphcog audit"]);
     for run in ["runs/3", "runs/4"] {
         sandbox
-            .run(&format!("audit -q -a {run} --robots top:1 --set perturbations.time_step=[2]"))
+            .run(&format!(
+                "audit -q -a {run} --robots top:1 --set perturbations.time_step=[2]"
+            ))
             .ended(0, &[]);
     }
     with("--physical-only").ended(3, &["runs/eval.json: robot ", "morphcog audit"]);
     with("-o runs/eval.json").ended(2, &["--out runs/eval.json"]);
     with("-o runs/c.svg").ended(2, &["--out runs/c.svg"]);
-    with("--set trainings=9223372036854775807").ended(3, &["trainings = 9223372036854775807", "1 to 100000"]);
+    with("--set trainings=9223372036854775807")
+        .ended(3, &["trainings = 9223372036854775807", "1 to 100000"]);
     // Nothing to learn from.
-    let mut runless: serde_json::Value = serde_json::from_str(&sandbox.read("runs/eval.json")).unwrap();
+    let mut runless: serde_json::Value =
+        serde_json::from_str(&sandbox.read("runs/eval.json")).unwrap();
     runless["runs"] = serde_json::json!([]);
-    runless["robots"].as_array_mut().unwrap().iter_mut().for_each(|robot| robot["run"] = 0.into());
+    runless["robots"]
+        .as_array_mut()
+        .unwrap()
+        .iter_mut()
+        .for_each(|robot| robot["run"] = 0.into());
     sandbox.write("runless.json", runless.to_string());
-    sandbox.run("capacity --eval runless.json").ended(3, &["runless.json: runs"]);
-    let published = sandbox.read("runs/eval.json").replace("\"name\":\"tiny\"", "\"name\":\"gallery\"");
+    sandbox
+        .run("capacity --eval runless.json")
+        .ended(3, &["runless.json: runs"]);
+    let published = sandbox
+        .read("runs/eval.json")
+        .replace("\"name\":\"tiny\"", "\"name\":\"gallery\"");
     sandbox.write("gallery.json", published);
-    sandbox.run("capacity --eval gallery.json --physical-only").ended(3, &["morphcog audit"]);
-    sandbox.run("capacity --eval runs/3/run.json").ended(3, &["morphcog-eval"]);
-    sandbox.run("capacity --eval nowhere.json").ended(3, &["nowhere.json", "morphcog eval"]);
+    sandbox
+        .run("capacity --eval gallery.json --physical-only")
+        .ended(3, &["morphcog audit"]);
+    sandbox
+        .run("capacity --eval runs/3/run.json")
+        .ended(3, &["morphcog-eval"]);
+    sandbox
+        .run("capacity --eval nowhere.json")
+        .ended(3, &["nowhere.json", "morphcog eval"]);
 }
 
 #[test]

@@ -22,10 +22,18 @@ fn every_shipped_config_is_valid_and_its_built_in_copy_is_the_same() {
         Config::parse(text, name, &[]).unwrap();
         assert!(list.contains(name), "{list}");
     }
-    let plan = sandbox.run("config paper.toml --set seeds=[7]").ended(0, &[]).out;
+    let plan = sandbox
+        .run("config paper.toml --set seeds=[7]")
+        .ended(0, &[])
+        .out;
     sandbox.write("mine.toml", &plan);
-    assert!(list.contains("paper.toml") && plan.contains("seeds = [7]"), "{plan}");
-    sandbox.run("reproduce mine.toml --scale 2").ended(2, &["--scale 2"]);
+    assert!(
+        list.contains("paper.toml") && plan.contains("seeds = [7]"),
+        "{plan}"
+    );
+    sandbox
+        .run("reproduce mine.toml --scale 2")
+        .ended(2, &["--scale 2"]);
 }
 
 #[test]
@@ -34,13 +42,25 @@ fn a_printed_config_is_itself_a_config_equal_to_the_original() {
     for (name, text) in BUILT_IN {
         let printed = sandbox.run(&format!("config {name}")).ended(0, &[]).out;
         let original = Config::parse(text, name, &[]).unwrap();
-        assert_eq!(Config::parse(&printed, "printed.toml", &[]).unwrap(), original, "{name}");
+        assert_eq!(
+            Config::parse(&printed, "printed.toml", &[]).unwrap(),
+            original,
+            "{name}"
+        );
         sandbox.write("printed.toml", &printed);
-        assert_eq!(sandbox.run("config printed.toml").ended(0, &[]).out, printed);
-        assert!(printed.contains("[physics]") && printed.contains("gravity"), "every key is printed");
+        assert_eq!(
+            sandbox.run("config printed.toml").ended(0, &[]).out,
+            printed
+        );
+        assert!(
+            printed.contains("[physics]") && printed.contains("gravity"),
+            "every key is printed"
+        );
     }
-    let changed =
-        sandbox.run("config zero_one.toml --set map_elites.parents=7 --set seed=5").ended(0, &[]).out;
+    let changed = sandbox
+        .run("config zero_one.toml --set map_elites.parents=7 --set seed=5")
+        .ended(0, &[])
+        .out;
     let changed = Config::parse(&changed, "changed.toml", &[]).unwrap();
     assert_eq!((changed.map_elites.parents, changed.seed), (7, 5));
 }
@@ -51,7 +71,10 @@ fn a_file_in_this_folder_comes_before_the_built_in_config_of_its_name() {
     let built_in = sandbox.run("config quickstart.toml").ended(0, &[]).out;
     assert_eq!(sandbox.run("config quickstart").ended(0, &[]).out, built_in);
     sandbox.write("quickstart.toml", TINY);
-    assert_ne!(sandbox.run("config quickstart.toml").ended(0, &[]).out, built_in);
+    assert_ne!(
+        sandbox.run("config quickstart.toml").ended(0, &[]).out,
+        built_in
+    );
 }
 
 #[test]
@@ -68,20 +91,34 @@ fn a_config_that_is_somebody_elses_is_not_overwritten_unasked() {
     let sandbox = Sandbox::tiny();
     let foreign = "# Of a page\nbaseURL = \"x\"\n";
     sandbox.write("site/config.toml", foreign);
-    sandbox.run("evolve -q -c tiny.toml -o site").ended(5, &["site/config.toml", "--force"]);
+    sandbox
+        .run("evolve -q -c tiny.toml -o site")
+        .ended(5, &["site/config.toml", "--force"]);
     assert_eq!(sandbox.read("site/config.toml"), foreign);
     assert!(!sandbox.path("site/run.json").exists());
     // One's own, with what was written about it, is the config of its run, but not of another.
     let own = format!("# Why so\n{TINY}");
     sandbox.write("own/config.toml", &own);
-    sandbox.run("evolve -q -c own/config.toml -o own --set seed=9").ended(5, &["own/config.toml"]);
-    sandbox.run("evolve -q -c own/config.toml -o own").ended(0, &[]);
+    sandbox
+        .run("evolve -q -c own/config.toml -o own --set seed=9")
+        .ended(5, &["own/config.toml"]);
+    sandbox
+        .run("evolve -q -c own/config.toml -o own")
+        .ended(0, &[]);
     assert_eq!(sandbox.read("own/config.toml"), own);
-    sandbox.run("evolve -q -c tiny.toml -o site --force").ended(0, &[]);
+    sandbox
+        .run("evolve -q -c tiny.toml -o site --force")
+        .ended(0, &[]);
     // What the program wrote, and no run came of, is in nobody's way.
     std::fs::create_dir(sandbox.path("begun")).unwrap();
-    std::fs::copy(sandbox.path("site/config.toml"), sandbox.path("begun/config.toml")).unwrap();
-    sandbox.run("evolve -q -c tiny.toml -o begun --set seed=9").ended(0, &[]);
+    std::fs::copy(
+        sandbox.path("site/config.toml"),
+        sandbox.path("begun/config.toml"),
+    )
+    .unwrap();
+    sandbox
+        .run("evolve -q -c tiny.toml -o begun --set seed=9")
+        .ended(0, &[]);
 }
 
 #[test]
@@ -91,7 +128,9 @@ fn the_name_in_a_run_file_leads_nowhere() {
     let named = text.replace("\"name\":\"tiny\"", "\"name\":\"../escaped\"");
     assert_ne!(named, text);
     sandbox.write("run/run.json", named);
-    sandbox.run("evolve -q -c run/config.toml -g 1").ended(0, &[]);
+    sandbox
+        .run("evolve -q -c run/config.toml -g 1")
+        .ended(0, &[]);
     assert!(sandbox.path("runs/escaped-seed3/run.json").exists());
 }
 
@@ -99,14 +138,25 @@ fn the_name_in_a_run_file_leads_nowhere() {
 fn toml_and_json_with_the_same_keys_make_the_same_run() {
     let sandbox = Sandbox::tiny();
     let table: toml::Table = toml::from_str(TINY).unwrap();
-    sandbox.write("json/tiny.json", serde_json::to_string_pretty(&table).unwrap());
+    sandbox.write(
+        "json/tiny.json",
+        serde_json::to_string_pretty(&table).unwrap(),
+    );
     sandbox.run("evolve -q -c tiny.toml -o a").ended(0, &[]);
-    sandbox.run("evolve -q -c json/tiny.json -o b").ended(0, &[]);
+    sandbox
+        .run("evolve -q -c json/tiny.json -o b")
+        .ended(0, &[]);
     assert_eq!(sandbox.read("a/run.json"), sandbox.read("b/run.json"));
     assert_eq!(sandbox.read("a/config.toml"), sandbox.read("b/config.toml"));
     // The config that a run writes makes the same run again.
-    std::fs::copy(sandbox.path("a/config.toml"), sandbox.path("json/tiny.toml")).unwrap();
-    sandbox.run("evolve -q -c json/tiny.toml -o c").ended(0, &[]);
+    std::fs::copy(
+        sandbox.path("a/config.toml"),
+        sandbox.path("json/tiny.toml"),
+    )
+    .unwrap();
+    sandbox
+        .run("evolve -q -c json/tiny.toml -o c")
+        .ended(0, &[]);
     assert_eq!(sandbox.read("a/run.json"), sandbox.read("c/run.json"));
 }
 
@@ -115,49 +165,128 @@ fn a_wrong_config_is_refused_with_file_line_and_key() {
     let sandbox = Sandbox::new();
     let wrong = |name: &str, text: &str, words: &[&str]| {
         sandbox.write(name, text);
-        sandbox.run(&format!("evolve -c {name} -o run")).ended(3, words);
+        sandbox
+            .run(&format!("evolve -c {name} -o run"))
+            .ended(3, words);
         assert!(!sandbox.path("run").exists(), "{name}: {text}");
     };
     let with = |line: &str| format!("{TINY}\n[physics]\n{line}\n");
     let line = |text: &str| text.lines().count();
     let place = format!("own.toml:{}", line(&with("x")));
-    wrong("own.toml", &with("gravitee = 3"), &[&place, "physics", "gravitee"]);
-    wrong("own.toml", &with("gravity = \"much\""), &[&place, "physics.gravity"]);
-    wrong("own.toml", &with("substeps = -1"), &[&place, "physics.substeps"]);
-    wrong("own.toml", &with("substeps = 1e3"), &[&place, "physics.substeps"]);
+    wrong(
+        "own.toml",
+        &with("gravitee = 3"),
+        &[&place, "physics", "gravitee"],
+    );
+    wrong(
+        "own.toml",
+        &with("gravity = \"much\""),
+        &[&place, "physics.gravity"],
+    );
+    wrong(
+        "own.toml",
+        &with("substeps = -1"),
+        &[&place, "physics.substeps"],
+    );
+    wrong(
+        "own.toml",
+        &with("substeps = 1e3"),
+        &[&place, "physics.substeps"],
+    );
     wrong("own.toml", &with("substeps = = 3"), &[&place]);
-    wrong("own.toml", &TINY.replace("[[0], [1]]", "[[0], [300]]"), &["own.toml:10", "task.groups"]);
+    wrong(
+        "own.toml",
+        &TINY.replace("[[0], [1]]", "[[0], [300]]"),
+        &["own.toml:10", "task.groups"],
+    );
     let two = ["own.toml:10", "task.groups"];
-    wrong("own.toml", &TINY.replace("[[0], [1]]", "[[0], [1], [2]]"), &two);
+    wrong(
+        "own.toml",
+        &TINY.replace("[[0], [1]]", "[[0], [1], [2]]"),
+        &two,
+    );
     wrong("own.toml", &TINY.replace("[[0], [1]]", "[[0]]"), &two);
-    wrong("own.toml", &TINY.replace("\"fresh\"", "\"stale\""), &["own.toml:20", "protocol.rollout", "stale"]);
-    wrong("own.toml", &TINY.replace("seed = 3", "seed = 3\nseed = 4"), &["own.toml:3: "]);
-    wrong("own.toml", &TINY.replace("seed = 3", "sed = 3"), &["own.toml:2", "sed"]);
+    wrong(
+        "own.toml",
+        &TINY.replace("\"fresh\"", "\"stale\""),
+        &["own.toml:20", "protocol.rollout", "stale"],
+    );
+    wrong(
+        "own.toml",
+        &TINY.replace("seed = 3", "seed = 3\nseed = 4"),
+        &["own.toml:3: "],
+    );
+    wrong(
+        "own.toml",
+        &TINY.replace("seed = 3", "sed = 3"),
+        &["own.toml:2", "sed"],
+    );
     // What is wrong with values that are well typed.
-    wrong("own.toml", &TINY.replace("[[0], [1]]", "[[0], []]"), &["own.toml", "task"]);
-    wrong("own.toml", &TINY.replace("[[0], [1]]", "[[0], [0]]"), &["own.toml", "task"]);
-    wrong("own.toml", &TINY.replace("[0, 1]", "[0, 1, 2]"), &["data.train_images", "image 2"]);
-    wrong("own.toml", &TINY.replace("[0, 1]", "[0]"), &["data.train_images", "class 1"]);
-    wrong("own.toml", &TINY.replace("[0, 1]", "[0, 10000000]"), &["data.train_images", "10000000"]);
+    wrong(
+        "own.toml",
+        &TINY.replace("[[0], [1]]", "[[0], []]"),
+        &["own.toml", "task"],
+    );
+    wrong(
+        "own.toml",
+        &TINY.replace("[[0], [1]]", "[[0], [0]]"),
+        &["own.toml", "task"],
+    );
+    wrong(
+        "own.toml",
+        &TINY.replace("[0, 1]", "[0, 1, 2]"),
+        &["data.train_images", "image 2"],
+    );
+    wrong(
+        "own.toml",
+        &TINY.replace("[0, 1]", "[0]"),
+        &["data.train_images", "class 1"],
+    );
+    wrong(
+        "own.toml",
+        &TINY.replace("[0, 1]", "[0, 10000000]"),
+        &["data.train_images", "10000000"],
+    );
     wrong(
         "own.toml",
         &TINY.replace("height = 5", "height = 0"),
         &["own.toml:6: ", "body.height = 0", "1 to 64"],
     );
-    wrong("own.toml", &TINY.replace("control_steps = 20", "control_steps = 0"), &["protocol.control_steps"]);
-    wrong("own.toml", &with("time_step = nan"), &["own.toml", "physics.time_step"]);
-    wrong("own.toml", &with("time_step = -inf"), &["own.toml", "physics.time_step"]);
+    wrong(
+        "own.toml",
+        &TINY.replace("control_steps = 20", "control_steps = 0"),
+        &["protocol.control_steps"],
+    );
+    wrong(
+        "own.toml",
+        &with("time_step = nan"),
+        &["own.toml", "physics.time_step"],
+    );
+    wrong(
+        "own.toml",
+        &with("time_step = -inf"),
+        &["own.toml", "physics.time_step"],
+    );
     wrong("own.toml", "", &["own.toml", "task"]);
 
     let table: toml::Table = toml::from_str(TINY).unwrap();
     let json = serde_json::to_string_pretty(&table).unwrap();
-    let at = |word: &str| format!("own.json:{}", 1 + json.lines().position(|l| l.contains(word)).unwrap());
+    let at = |word: &str| {
+        format!(
+            "own.json:{}",
+            1 + json.lines().position(|l| l.contains(word)).unwrap()
+        )
+    };
     let changed = |from: &str, to: &str| {
         assert!(json.contains(from), "{json}");
         json.replace(from, to)
     };
     let at_steps = at("control_steps");
-    wrong("own.json", &changed("control_steps", "control_step"), &[&at_steps, "protocol", "control_step"]);
+    wrong(
+        "own.json",
+        &changed("control_steps", "control_step"),
+        &[&at_steps, "protocol", "control_step"],
+    );
     wrong(
         "own.json",
         &changed("\"control_steps\": 20", "\"control_steps\": \"20\""),
@@ -168,7 +297,11 @@ fn a_wrong_config_is_refused_with_file_line_and_key() {
         &changed("\"control_steps\": 20", "\"control_steps\": 1e99"),
         &[&at_steps, "protocol.control_steps"],
     );
-    wrong("own.json", &changed("\"control_steps\": 20", "\"control_steps\": NaN"), &[&at_steps]);
+    wrong(
+        "own.json",
+        &changed("\"control_steps\": 20", "\"control_steps\": NaN"),
+        &[&at_steps],
+    );
     wrong("own.json", &json[..json.len() / 2], &["own.json:"]);
     wrong("own.json", &format!("{json} {json}"), &["own.json:"]);
     wrong("own.json", "", &["own.json"]);
@@ -198,11 +331,17 @@ fn a_wrong_set_is_refused_with_2_and_quotes_it() {
     // the same as anything else.
     let table: toml::Table =
         toml::from_str(&TINY.replace("[data]\n", "[data]\nbuiltin = { seed = 77 }\n")).unwrap();
-    let large = serde_json::to_string(&table).unwrap().replace(":77", ":9223372036854775808");
+    let large = serde_json::to_string(&table)
+        .unwrap()
+        .replace(":77", ":9223372036854775808");
     sandbox.write("large.json", large);
-    sandbox
-        .run("evolve -c large.json -o run")
-        .ended(3, &["data.builtin.seed = 9223372036854775808", "0 to 9223372036854775807"]);
+    sandbox.run("evolve -c large.json -o run").ended(
+        3,
+        &[
+            "data.builtin.seed = 9223372036854775808",
+            "0 to 9223372036854775807",
+        ],
+    );
     sandbox
         .run("evolve -c tiny.toml -o run --set generations=0")
         .ended(3, &["--set generations=0: ", "generations = 0"]);
@@ -214,21 +353,44 @@ fn configs_are_read_in_utf16_and_under_names_in_capitals() {
     sandbox.run("evolve -q -c tiny.toml -o run").ended(0, &[]);
     // As PowerShell writes `morphcog config … > own.toml`.
     let units: Vec<u16> = std::iter::once(0xfeff).chain(TINY.encode_utf16()).collect();
-    sandbox.write("OWN.TOML", units.iter().flat_map(|unit| unit.to_le_bytes()).collect::<Vec<u8>>());
-    sandbox.write("BIG.TOML", units.iter().flat_map(|unit| unit.to_be_bytes()).collect::<Vec<u8>>());
+    sandbox.write(
+        "OWN.TOML",
+        units
+            .iter()
+            .flat_map(|unit| unit.to_le_bytes())
+            .collect::<Vec<u8>>(),
+    );
+    sandbox.write(
+        "BIG.TOML",
+        units
+            .iter()
+            .flat_map(|unit| unit.to_be_bytes())
+            .collect::<Vec<u8>>(),
+    );
     let table: toml::Table = toml::from_str(TINY).unwrap();
     sandbox.write("OWN.JSON", serde_json::to_string(&table).unwrap());
     for name in ["OWN.TOML", "BIG.TOML", "OWN.JSON"] {
-        sandbox.run(&format!("evolve -q -c {name} -o run-{name}")).ended(0, &[]);
-        assert_eq!(sandbox.run_file(&format!("run-{name}")).elites, sandbox.run_file("run").elites);
+        sandbox
+            .run(&format!("evolve -q -c {name} -o run-{name}"))
+            .ended(0, &[]);
+        assert_eq!(
+            sandbox.run_file(&format!("run-{name}")).elites,
+            sandbox.run_file("run").elites
+        );
     }
     sandbox.write("half.toml", [0xff, 0xfe, b'a']);
-    sandbox.run("evolve -c half.toml -o none").ended(3, &["half.toml: ", "UTF-8"]);
+    sandbox
+        .run("evolve -c half.toml -o none")
+        .ended(3, &["half.toml: ", "UTF-8"]);
     // A resumed run's own config is compared with it.
-    sandbox.run("evolve -q -c OWN.TOML -o run-OWN.TOML -g 14 --resume").ended(0, &[]);
+    sandbox
+        .run("evolve -q -c OWN.TOML -o run-OWN.TOML -g 14 --resume")
+        .ended(0, &[]);
     let criteria = "{\"seconds\": \"no\"}";
     sandbox.write("CRITERIA.JSON", criteria);
-    sandbox.run("audit -a run --criteria CRITERIA.JSON -o a.json").ended(3, &["CRITERIA.JSON:1"]);
+    sandbox
+        .run("audit -a run --criteria CRITERIA.JSON -o a.json")
+        .ended(3, &["CRITERIA.JSON:1"]);
 }
 
 /// What `config` prints of `own.toml`, [`TINY`] for gaits, with some overrides.
@@ -257,7 +419,9 @@ fn set_reaches_a_key_and_unsets_it() {
         toml::Value::Array(vec![8.into()])
     );
     // What was set is what is run.
-    sandbox.run("evolve -q -c own.toml -o run --set archive.keep=3 -g 2").ended(0, &[]);
+    sandbox
+        .run("evolve -q -c own.toml -o run --set archive.keep=3 -g 2")
+        .ended(0, &[]);
     assert_eq!(sandbox.run_file("run").config.archive.keep, Some(3));
 }
 
@@ -267,29 +431,59 @@ fn an_error_blames_the_override_that_caused_it() {
     sandbox.write("one.toml", TINY);
     let blamed = |set: &[&str], code: i32, blamed: &str, words: &[&str]| {
         let all = set.iter().flat_map(|set| ["--set", set]);
-        let command = sandbox.command(["evolve", "-c", "one.toml", "-o", "run"].into_iter().chain(all));
+        let command = sandbox.command(
+            ["evolve", "-c", "one.toml", "-o", "run"]
+                .into_iter()
+                .chain(all),
+        );
         let place = format!("error: --set {blamed}: ");
         said(command).ended(code, &[&[place.as_str()], words].concat());
         assert!(!sandbox.path("run").exists());
     };
     // By itself, alone or beside others.
-    blamed(&["archive.keep=0"], 3, "archive.keep=0", &["archive.keep = 0"]);
+    blamed(
+        &["archive.keep=0"],
+        3,
+        "archive.keep=0",
+        &["archive.keep = 0"],
+    );
     blamed(&["archive.keep=0", "seed=4"], 3, "archive.keep=0", &[]);
-    blamed(&["train.rounds=2", "archive.keep=0"], 3, "archive.keep=0", &[]);
+    blamed(
+        &["train.rounds=2", "archive.keep=0"],
+        3,
+        "archive.keep=0",
+        &[],
+    );
     // Keys and items that are not there, to be set or unset.
-    blamed(&["seed=4", "task.groups.3.1=1"], 2, "task.groups.3.1=1", &["1 to 2"]);
+    blamed(
+        &["seed=4", "task.groups.3.1=1"],
+        2,
+        "task.groups.3.1=1",
+        &["1 to 2"],
+    );
     blamed(&["task.groups.0.1=1"], 2, "task.groups.0.1=1", &["1 to 2"]);
     blamed(&["stages.1.keep=1"], 2, "stages.1.keep=1", &["`stages`"]);
     blamed(&["seed=4", "archive.kep=1"], 2, "archive.kep=1", &["`kep`"]);
     blamed(&["seed=4", "archive.kep="], 2, "archive.kep=", &["`kep`"]);
-    blamed(&["data.dataset=", "seed=4"], 2, "data.dataset=", &["`dataset`"]);
+    blamed(
+        &["data.dataset=", "seed=4"],
+        2,
+        "data.dataset=",
+        &["`dataset`"],
+    );
     blamed(&["body.height=x", "seed=4"], 2, "body.height=x", &[]);
     // The file's own fault stays the file's.
     sandbox.write("bad.toml", TINY.replace("height = 5", "height = 0"));
-    sandbox.run("evolve -c bad.toml -o run --set seed=4").ended(3, &["error: bad.toml:6: body.height = 0"]);
+    sandbox
+        .run("evolve -c bad.toml -o run --set seed=4")
+        .ended(3, &["error: bad.toml:6: body.height = 0"]);
     // So it is with what else is set.
-    sandbox.run("audit --set least_kept=2 --set threshold=1").ended(3, &["--set least_kept=2: "]);
-    sandbox.run("audit --set perturbations.start.9=1").ended(2, &["perturbations.start 9"]);
+    sandbox
+        .run("audit --set least_kept=2 --set threshold=1")
+        .ended(3, &["--set least_kept=2: "]);
+    sandbox
+        .run("audit --set perturbations.start.9=1")
+        .ended(2, &["perturbations.start 9"]);
     sandbox
         .run("capacity --eval no.json --set step=2 --set mlp.epochs=0")
         .ended(3, &["--set mlp.epochs=0: "]);

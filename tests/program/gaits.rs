@@ -24,7 +24,9 @@ fn sandbox() -> Sandbox {
 }
 
 fn evolve(sandbox: &Sandbox) -> RunFile {
-    sandbox.run("evolve -q -c response.toml -o run").ended(0, &[]);
+    sandbox
+        .run("evolve -q -c response.toml -o run")
+        .ended(0, &[]);
     sandbox.run_file("run")
 }
 
@@ -42,16 +44,37 @@ fn a_robot_is_as_fit_as_opposite_images_move_its_probe_apart() {
         });
         let probe = Body::new(probe).unwrap();
         let places = probe.counts().sensor;
-        let job = Job { body: &probe, order: vec![], may_win: Box::new(|_| true), given_up: None };
-        let TrainingImages { stimuli, conditions, .. } = &training;
-        let Config { physics, protocol, .. } = &run.config;
+        let job = Job {
+            body: &probe,
+            order: vec![],
+            may_win: Box::new(|_| true),
+            given_up: None,
+        };
+        let TrainingImages {
+            stimuli,
+            conditions,
+            ..
+        } = &training;
+        let Config {
+            physics, protocol, ..
+        } = &run.config;
         let (savings, stop) = (Savings::default(), AtomicBool::new(false));
-        let evaluation =
-            evaluate(&[job], stimuli, conditions, physics, protocol, savings, &Session::new(&stop, &()))
-                .unwrap();
-        let Outcome::Walked(d) = &evaluation[0].outcome else { panic!("{}: unstable", robot.id) };
+        let evaluation = evaluate(
+            &[job],
+            stimuli,
+            conditions,
+            physics,
+            protocol,
+            savings,
+            &Session::new(&stop, &()),
+        )
+        .unwrap();
+        let Outcome::Walked(d) = &evaluation[0].outcome else {
+            panic!("{}: unstable", robot.id)
+        };
         assert_eq!(d, &robot.displacements, "{}", robot.id);
-        let [odd, even] = [-1.0, 1.0].map(|sign| [0, 2, 4, 6].map(|i| (d[i] + sign * d[i + 1]) / 2.0));
+        let [odd, even] =
+            [-1.0, 1.0].map(|sign| [0, 2, 4, 6].map(|i| (d[i] + sign * d[i + 1]) / 2.0));
         let within = |a: f64, b: f64| (a - b).powi(2) / 2.0;
         let chance = (within(even[0], even[2]) + within(even[1], even[3])) / 2.0;
         let linear = odd.iter().map(|odd| odd * odd).sum::<f64>() / 4.0 - chance;
@@ -59,14 +82,22 @@ fn a_robot_is_as_fit_as_opposite_images_move_its_probe_apart() {
         let size = robot.body.height() * robot.body.width();
         let response = (places.clamp(1, size * 2 / 3) as f64).sqrt()
             * (linear.signum() * linear.abs().sqrt() - anyway / 8.0);
-        assert!((response - robot.objective).abs() < 1e-9, "{}: {response}", robot.id);
+        assert!(
+            (response - robot.objective).abs() < 1e-9,
+            "{}: {response}",
+            robot.id
+        );
         if places == 0 {
             assert!(robot.objective <= 0.0, "{}", robot.id);
         }
         moved += usize::from(robot.objective > 0.01);
     }
     assert!(moved >= 3, "{moved} of {} respond", run.elites.len());
-    assert!(run.elites.iter().any(|robot| robot.body != robot.body.probe()));
+    assert!(
+        run.elites
+            .iter()
+            .any(|robot| robot.body != robot.body.probe())
+    );
     assert!(!run.follows_protocol());
 }
 
@@ -76,10 +107,22 @@ fn what_reads_a_run_reads_this_one() {
     let run = evolve(&sandbox);
     let best = &run.best().unwrap().id;
     for command in ["eval", "audit"] {
-        sandbox.run(&format!("{command} -a run/run.json")).ended(3, &["morphcog train"]);
+        sandbox
+            .run(&format!("{command} -a run/run.json"))
+            .ended(3, &["morphcog train"]);
     }
-    sandbox.run(&format!("replay -a run/run.json --robot {best} -o replay.png")).ended(0, &[]);
-    sandbox.run("plot archive -a run/run.json -o archive.svg").ended(0, &[]);
+    sandbox
+        .run(&format!(
+            "replay -a run/run.json --robot {best} -o replay.png"
+        ))
+        .ended(0, &[]);
+    sandbox
+        .run("plot archive -a run/run.json -o archive.svg")
+        .ended(0, &[]);
     sandbox.run("report run").ended(0, &[]);
-    assert!(sandbox.read("run/report.html").contains("the two images of a pair"));
+    assert!(
+        sandbox
+            .read("run/report.html")
+            .contains("the two images of a pair")
+    );
 }

@@ -39,7 +39,10 @@ fn the_help_of_every_command_has_an_example_that_names_it() {
     for command in COMMANDS.iter().filter(|command| **command != "help") {
         let said = sandbox.run(&format!("{command} --help")).ended(0, &[]);
         let example = format!("morphcog {command}");
-        let (_, examples) = said.out.split_once("Example").unwrap_or_else(|| panic!("{command}: no example"));
+        let (_, examples) = said
+            .out
+            .split_once("Example")
+            .unwrap_or_else(|| panic!("{command}: no example"));
         assert!(examples.contains(example.trim()), "{command}: {examples}");
     }
 }
@@ -100,7 +103,9 @@ fn completions_for_all_shells_name_every_command() {
     let sandbox = Sandbox::new();
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
         let said = sandbox.run(&format!("completions {shell}")).ended(0, &[]);
-        for command in ["evolve", "eval", "replay", "simulate", "gallery", "--resume"] {
+        for command in [
+            "evolve", "eval", "replay", "simulate", "gallery", "--resume",
+        ] {
             let word = command.trim_start_matches('-');
             assert!(said.out.contains(word), "{shell}: {command}");
         }
@@ -112,10 +117,17 @@ fn where_a_few_words_are_meant_shells_offer_them() {
     let sandbox = Sandbox::new();
     let [bash, zsh] = ["bash", "zsh"].map(|shell| sandbox.run(&format!("completions {shell}")).out);
     let offered = |words: &str, times: usize| {
-        assert_eq!(zsh.matches(&format!(":({words})")).count(), times, "zsh: {words}");
+        assert_eq!(
+            zsh.matches(&format!(":({words})")).count(),
+            times,
+            "zsh: {words}"
+        );
         assert!(bash.contains(words), "bash: {words}");
     };
-    offered("body spacetime snapshots archive progress accuracy capacity", 1);
+    offered(
+        "body spacetime snapshots archive progress accuracy capacity",
+        1,
+    );
     // Of eval and of team; bash has it for options.
     offered("test validation", 2);
     assert_eq!(bash.matches("compgen -W \"test validation\"").count(), 2);
@@ -123,13 +135,22 @@ fn where_a_few_words_are_meant_shells_offer_them() {
     offered("plain paper", 1);
     offered("mnist fashion-mnist", 1);
     offered("builtin mnist fashion-mnist", 2);
-    offered(&morphcog::commands::schema::ALL.map(|schema| schema.name).join(" "), 1);
+    offered(
+        &morphcog::commands::schema::ALL
+            .map(|schema| schema.name)
+            .join(" "),
+        1,
+    );
     let configs = BUILT_IN.map(|(name, _)| name).join(" ");
     offered(&format!("{configs} {}", PAPER_TOML.0), 1);
     // Errors have them, too, where nothing else may be meant.
     sandbox.run("plot bodies").ended(2, &["body, spacetime"]);
-    sandbox.run("eval --split train").ended(2, &["test or validation"]);
-    sandbox.run("replay --format mpeg").ended(2, &["gif, html, png or terminal"]);
+    sandbox
+        .run("eval --split train")
+        .ended(2, &["test or validation"]);
+    sandbox
+        .run("replay --format mpeg")
+        .ended(2, &["gif, html, png or terminal"]);
     sandbox.write("mine.toml", TINY);
     sandbox.run("config mine.toml").ended(0, &[]);
 }
@@ -137,7 +158,10 @@ fn where_a_few_words_are_meant_shells_offer_them() {
 #[test]
 fn the_man_page_renders() {
     let page = Sandbox::new().run("man").ended(0, &[]).out;
-    assert!(page.contains(".TH morphcog 1") && page.contains(".SH NAME"), "{page}");
+    assert!(
+        page.contains(".TH morphcog 1") && page.contains(".SH NAME"),
+        "{page}"
+    );
     assert!(page.contains("evolve") && page.contains("Exit codes"));
     // Where there is a man, it understands it.
     let sandbox = Sandbox::new();
@@ -157,9 +181,20 @@ fn every_schema_is_listed_and_printed_and_another_name_is_refused_with_2() {
     let sandbox = Sandbox::new();
     let listed = sandbox.run("schema").ended(0, &[]).out;
     for made in schema::ALL {
-        assert!(listed.lines().any(|line| line.starts_with(made.name)), "{listed}");
-        let printed = sandbox.run(&format!("schema {}", made.name)).ended(0, &[]).out;
-        assert_eq!(serde_json::from_str::<serde_json::Value>(&printed).unwrap(), made.json());
+        assert!(
+            listed.lines().any(|line| line.starts_with(made.name)),
+            "{listed}"
+        );
+        let printed = sandbox
+            .run(&format!("schema {}", made.name))
+            .ended(0, &[])
+            .out;
+        assert_eq!(
+            serde_json::from_str::<serde_json::Value>(&printed).unwrap(),
+            made.json()
+        );
     }
-    sandbox.run("schema rnu").ended(2, &["schema rnu", "config, sweep, plan"]);
+    sandbox
+        .run("schema rnu")
+        .ended(2, &["schema rnu", "config, sweep, plan"]);
 }

@@ -17,21 +17,35 @@ fn no_table_shows_a_minus_nothing() {
         elite["displacements"] = serde_json::json!([-0.001, 0.001]);
     }
     let mut run: RunFile = serde_json::from_value(run).unwrap();
-    run.stats = run.archive().unwrap().stats(run.dimensions.possible_cells, run.config.archive.qd_offset);
+    run.stats = run
+        .archive()
+        .unwrap()
+        .stats(run.dimensions.possible_cells, run.config.archive.qd_offset);
     sandbox.write("run/run.json", run.to_json());
-    let mut said = sandbox.run("eval -a run -n 4 --cycles 1 --robots top:2").ended(0, &[]).out;
+    let mut said = sandbox
+        .run("eval -a run -n 4 --cycles 1 --robots top:2")
+        .ended(0, &[])
+        .out;
     said += &sandbox.run("replay -a run --format html").ended(0, &[]).out;
-    sandbox.run("report -q --archive run --rollouts 1").ended(0, &[]);
+    sandbox
+        .run("report -q --archive run --rollouts 1")
+        .ended(0, &[]);
     sandbox.run("plot -q archive --archive run").ended(0, &[]);
-    sandbox.run("plot -q body --archive run -o body.svg").ended(0, &[]);
+    sandbox
+        .run("plot -q body --archive run -o body.svg")
+        .ended(0, &[]);
     for file in ["run/report.html", "run/plot-archive.svg", "body.svg"] {
         said += &sandbox.read(file);
     }
-    for nothing in
-        ["-0.00<", "-0.00 ", "−0.00", "-0.0<", "-0.0 ", "-0.0]", "−0.0<", "−0.0 ", "+0.0<", "+0.0 "]
-    {
-        let at =
-            said.find(nothing).map(|at| said[at.saturating_sub(60)..].chars().take(90).collect::<String>());
+    for nothing in [
+        "-0.00<", "-0.00 ", "−0.00", "-0.0<", "-0.0 ", "-0.0]", "−0.0<", "−0.0 ", "+0.0<", "+0.0 ",
+    ] {
+        let at = said.find(nothing).map(|at| {
+            said[at.saturating_sub(60)..]
+                .chars()
+                .take(90)
+                .collect::<String>()
+        });
         assert_eq!(at, None, "{nothing:?}");
     }
 }
@@ -42,9 +56,20 @@ fn no_table_shows_a_minus_nothing() {
 fn speed_is_measured_in_processor_time() {
     let sandbox = Sandbox::new();
     let said = sandbox.run("bench --json").ended(0, &[]);
-    let clocks: Vec<_> = said.json_lines().iter().map(|line| line["clock"].clone()).collect();
-    let expected = if cfg!(target_os = "macos") { "processor" } else { "wall" };
-    assert!(clocks.len() >= 5 && clocks.iter().all(|clock| clock == expected), "{clocks:?}");
+    let clocks: Vec<_> = said
+        .json_lines()
+        .iter()
+        .map(|line| line["clock"].clone())
+        .collect();
+    let expected = if cfg!(target_os = "macos") {
+        "processor"
+    } else {
+        "wall"
+    };
+    assert!(
+        clocks.len() >= 5 && clocks.iter().all(|clock| clock == expected),
+        "{clocks:?}"
+    );
 }
 
 #[test]
@@ -77,14 +102,31 @@ fn an_error_about_a_file_names_it_once_whatever_is_wrong_with_it() {
                 "eval -a run --robots best-validation:1",
             ],
         ),
-        ("eval.json", &["plot accuracy -a run", "capacity --eval run/eval.json", "eval -a run -n 4"]),
+        (
+            "eval.json",
+            &[
+                "plot accuracy -a run",
+                "capacity --eval run/eval.json",
+                "eval -a run -n 4",
+            ],
+        ),
         (
             "audit.json",
-            &["audit -a run", "eval -a run -n 4 --physical-only", "replay -a run --physical-only"],
+            &[
+                "audit -a run",
+                "eval -a run -n 4 --physical-only",
+                "replay -a run --physical-only",
+            ],
         ),
         ("response.json", &["response -a run --robots all"]),
         ("metrics.csv", &["plot progress -a run"]),
-        ("config.toml", &["evolve -c run/config.toml -o other", "config run/config.toml"]),
+        (
+            "config.toml",
+            &[
+                "evolve -c run/config.toml -o other",
+                "config run/config.toml",
+            ],
+        ),
     ];
     for (name, commands) in readers {
         let text = String::from_utf8(good[name].clone()).unwrap();
@@ -94,11 +136,15 @@ fn an_error_about_a_file_names_it_once_whatever_is_wrong_with_it() {
             half.into(),
             b"\xff\xfe\x00".to_vec(),
             b"[]".to_vec(),
-            text.replacen("morphcog-", "other-", 1).replacen("seed = ", "sed = ", 1).into(),
+            text.replacen("morphcog-", "other-", 1)
+                .replacen("seed = ", "sed = ", 1)
+                .into(),
             text.replacen("\"format_version\":1", "\"format_version\":99", 1)
                 .replacen("= 5", "= -5", 1)
                 .into(),
-            text.replacen(":0.", ":1e308,\"x\":0.", 1).replacen("generation,", "", 1).into(),
+            text.replacen(":0.", ":1e308,\"x\":0.", 1)
+                .replacen("generation,", "", 1)
+                .into(),
         ];
         let path = format!("run/{name}");
         for wound in wounds.iter().filter(|wound| **wound != good[name]) {
@@ -113,10 +159,21 @@ fn an_error_about_a_file_names_it_once_whatever_is_wrong_with_it() {
         // Nor is it read where there is no file, but a folder.
         std::fs::remove_file(sandbox.path(&path)).unwrap();
         std::fs::create_dir(sandbox.path(&path)).unwrap();
-        for command in commands.iter().filter(|command| !command.contains("plot accuracy")) {
+        for command in commands
+            .iter()
+            .filter(|command| !command.contains("plot accuracy"))
+        {
             let said = sandbox.run(command);
-            let line = said.err.lines().find(|line| line.starts_with("error:")).unwrap_or_default();
-            assert_eq!(line.matches(&path).count(), 1, "{command}: {name}: {said:?}");
+            let line = said
+                .err
+                .lines()
+                .find(|line| line.starts_with("error:"))
+                .unwrap_or_default();
+            assert_eq!(
+                line.matches(&path).count(),
+                1,
+                "{command}: {name}: {said:?}"
+            );
         }
         std::fs::remove_dir(sandbox.path(&path)).unwrap();
         sandbox.write(&path, &good[name]);
@@ -126,18 +183,35 @@ fn an_error_about_a_file_names_it_once_whatever_is_wrong_with_it() {
 #[test]
 fn no_command_writes_over_results_that_it_cannot_read() {
     let sandbox = with_run();
-    sandbox.run("eval -q -a run -n 4 --cycles 1 --robots best").ended(0, &[]);
+    sandbox
+        .run("eval -q -a run -n 4 --cycles 1 --robots best")
+        .ended(0, &[]);
     for (name, command) in [
         ("run/eval.json", "eval -a run -n 4 --cycles 1"),
-        ("run/eval-validation.json", "eval -a run --split validation -n 4 --cycles 1"),
+        (
+            "run/eval-validation.json",
+            "eval -a run --split validation -n 4 --cycles 1",
+        ),
         ("run/audit.json", "audit -a run"),
         ("run/response.json", "response -a run"),
-        ("capacity.json", "capacity --eval run/eval.json -o capacity.json"),
-        ("capacity.trainings.json", "capacity --eval run/eval.json -o capacity.json"),
-        ("run/validation.json", "eval -a run --robots best-validation:1"),
+        (
+            "capacity.json",
+            "capacity --eval run/eval.json -o capacity.json",
+        ),
+        (
+            "capacity.trainings.json",
+            "capacity --eval run/eval.json -o capacity.json",
+        ),
+        (
+            "run/validation.json",
+            "eval -a run --robots best-validation:1",
+        ),
     ] {
         let whole = std::fs::read(sandbox.path(name)).ok();
-        sandbox.write(name, "{\"format\": \"morphcog-later\", \"format_version\": 7}");
+        sandbox.write(
+            name,
+            "{\"format\": \"morphcog-later\", \"format_version\": 7}",
+        );
         sandbox.run(command).ended(3, &[name, "hint:"]);
         assert!(sandbox.read(name).contains("later"), "{command}");
         match whole {
@@ -152,26 +226,50 @@ fn no_command_writes_over_results_that_it_cannot_read() {
 fn an_archive_that_is_no_file_is_refused_at_once() {
     let sandbox = with_run();
     let pipe = sandbox.path("pipe.json");
-    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    assert!(
+        std::process::Command::new("mkfifo")
+            .arg(&pipe)
+            .status()
+            .unwrap()
+            .success()
+    );
     for archive in ["pipe.json", "/dev/stdin", "/dev/zero"] {
-        for command in ["eval", "replay", "audit", "report", "plot archive", "plot progress", "team"] {
-            let said = sandbox.run(&format!("{command} -a {archive}")).ended(3, &[]);
+        for command in [
+            "eval",
+            "replay",
+            "audit",
+            "report",
+            "plot archive",
+            "plot progress",
+            "team",
+        ] {
+            let said = sandbox
+                .run(&format!("{command} -a {archive}"))
+                .ended(3, &[]);
             assert_eq!(said.err.matches(archive).count(), 1, "{command}: {said:?}");
         }
     }
-    sandbox.run("capacity --eval pipe.json").ended(3, &["pipe.json"]);
+    sandbox
+        .run("capacity --eval pipe.json")
+        .ended(3, &["pipe.json"]);
 }
 
 #[test]
 fn quiet_leaves_results_only() {
     let sandbox = Sandbox::tiny();
-    let said = sandbox.run("evolve --quiet -c tiny.toml -o run").ended(0, &[]);
+    let said = sandbox
+        .run("evolve --quiet -c tiny.toml -o run")
+        .ended(0, &[]);
     let run = sandbox.run_file("run");
     let best = &run.best().unwrap().id;
     assert!(said.err.is_empty() && said.out.contains(best), "{said:?}");
-    let said = sandbox.run("evolve -c tiny.toml -o loud").ended(0, &["12/12"]);
+    let said = sandbox
+        .run("evolve -c tiny.toml -o loud")
+        .ended(0, &["12/12"]);
     assert!(said.out.contains(best), "{said:?}");
-    let said = sandbox.run("eval -q -a run/run.json -n 2 --cycles 1").ended(0, &[]);
+    let said = sandbox
+        .run("eval -q -a run/run.json -n 2 --cycles 1")
+        .ended(0, &[]);
     assert!(said.err.is_empty() && said.out.contains(best), "{said:?}");
 }
 
@@ -179,12 +277,21 @@ fn quiet_leaves_results_only() {
 fn with_json_every_line_on_stdout_is_json() {
     let sandbox = with_run();
     let events = |args: &str, code: i32| -> Vec<String> {
-        let lines = sandbox.run(&format!("--json {args}")).ended(code, &[]).json_lines();
+        let lines = sandbox
+            .run(&format!("--json {args}"))
+            .ended(code, &[])
+            .json_lines();
         assert!(!lines.is_empty(), "{args}");
-        lines.iter().map(|line| line["event"].as_str().unwrap().to_string()).collect()
+        lines
+            .iter()
+            .map(|line| line["event"].as_str().unwrap().to_string())
+            .collect()
     };
     let evolve = events("evolve -c tiny.toml -o new", 0);
-    assert_eq!(evolve.iter().filter(|name| *name == "generation").count(), 13);
+    assert_eq!(
+        evolve.iter().filter(|name| *name == "generation").count(),
+        13
+    );
     assert_eq!(evolve.last().unwrap(), "finished");
     events("eval -a run/run.json -n 4 --cycles 1", 0);
     events("replay -a run/run.json --every 20", 0);
@@ -205,8 +312,17 @@ fn documented(name: &str, heading: &str) -> Vec<(Vec<String>, String)> {
     let (_, text) = text.split_once(heading).unwrap();
     let row = |line: &str| {
         let line = line.replace("\\|", "¦");
-        let first = line.strip_prefix("| ")?.split(" | ").next()?.replace('¦', "|");
-        let names = first.split('`').skip(1).step_by(2).map(str::to_string).collect::<Vec<_>>();
+        let first = line
+            .strip_prefix("| ")?
+            .split(" | ")
+            .next()?
+            .replace('¦', "|");
+        let names = first
+            .split('`')
+            .skip(1)
+            .step_by(2)
+            .map(str::to_string)
+            .collect::<Vec<_>>();
         Some((names, line))
     };
     text.lines().filter_map(row).collect()
@@ -216,15 +332,23 @@ fn documented(name: &str, heading: &str) -> Vec<(Vec<String>, String)> {
 fn every_event_of_json_is_documented_with_its_fields() {
     let rows = documented("docs/command-line.md", "### JSON");
     let row = |event: &str| {
-        let found = rows.iter().find(|(names, _)| names.len() == 1 && names[0] == event);
-        &found.unwrap_or_else(|| panic!("the event {event} is not documented")).1
+        let found = rows
+            .iter()
+            .find(|(names, _)| names.len() == 1 && names[0] == event);
+        &found
+            .unwrap_or_else(|| panic!("the event {event} is not documented"))
+            .1
     };
     // All that the source has.
     let mut open = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("src")];
     let mut events = BTreeSet::new();
     while let Some(path) = open.pop() {
         if path.is_dir() {
-            open.extend(std::fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()));
+            open.extend(
+                std::fs::read_dir(path)
+                    .unwrap()
+                    .map(|entry| entry.unwrap().path()),
+            );
             continue;
         }
         let Ok(source) = std::fs::read_to_string(&path) else {
@@ -232,7 +356,10 @@ fn every_event_of_json_is_documented_with_its_fields() {
         };
         let code = source.split("#[cfg(test)]").next().unwrap();
         for call in [".event(", ".finding("] {
-            let names = code.split(call).skip(1).filter_map(|rest| rest.trim_start().strip_prefix('"'));
+            let names = code
+                .split(call)
+                .skip(1)
+                .filter_map(|rest| rest.trim_start().strip_prefix('"'));
             events.extend(names.map(|name| name.split('"').next().unwrap().to_string()));
         }
     }
@@ -268,11 +395,23 @@ fn every_event_of_json_is_documented_with_its_fields() {
         "eval -a nowhere.json",
     ] {
         let said = sandbox.run(&format!("{args} --json"));
-        assert_eq!(said.code, Some(if args.contains("nowhere") { 3 } else { 0 }), "{said:#?}");
+        assert_eq!(
+            said.code,
+            Some(if args.contains("nowhere") { 3 } else { 0 }),
+            "{said:#?}"
+        );
         for line in said.json_lines() {
             let event = line["event"].as_str().unwrap();
-            for field in line.as_object().unwrap().keys().filter(|field| *field != "event") {
-                assert!(row(event).contains(&format!("`{field}`")), "{args}: {event} has {field}");
+            for field in line
+                .as_object()
+                .unwrap()
+                .keys()
+                .filter(|field| *field != "event")
+            {
+                assert!(
+                    row(event).contains(&format!("`{field}`")),
+                    "{args}: {event} has {field}"
+                );
             }
             seen.insert(event.to_string());
         }
@@ -285,13 +424,27 @@ fn every_event_of_json_is_documented_with_its_fields() {
 #[test]
 fn a_written_file_is_named_for_programs() {
     let sandbox = with_run();
-    for (args, file) in
-        [("report run --rollouts 0", "run/report.html"), ("data sheet -o sheet.png --samples 1", "sheet.png")]
-    {
-        let lines = sandbox.run(&format!("{args} --json")).ended(0, &[]).json_lines();
+    for (args, file) in [
+        ("report run --rollouts 0", "run/report.html"),
+        ("data sheet -o sheet.png --samples 1", "sheet.png"),
+    ] {
+        let lines = sandbox
+            .run(&format!("{args} --json"))
+            .ended(0, &[])
+            .json_lines();
         let last = lines.last().unwrap();
-        assert_eq!((&last["event"], &last["file"]), (&"result".into(), &file.into()), "{lines:?}");
-        assert!(last["text"].as_str().unwrap().starts_with(&format!("wrote {file}")), "{last}");
+        assert_eq!(
+            (&last["event"], &last["file"]),
+            (&"result".into(), &file.into()),
+            "{lines:?}"
+        );
+        assert!(
+            last["text"]
+                .as_str()
+                .unwrap()
+                .starts_with(&format!("wrote {file}")),
+            "{last}"
+        );
     }
 }
 
@@ -303,7 +456,11 @@ fn every_column_of_a_test_and_of_an_audit_is_explained() {
         .run("evolve -q -c tiny.toml -o run --generations 40 --set protocol.control_steps=150")
         .ended(0, &[]);
     let rows = documented("docs/analysing.md", "## Test");
-    let explained: Vec<&str> = rows.iter().flat_map(|(names, _)| names).map(String::as_str).collect();
+    let explained: Vec<&str> = rows
+        .iter()
+        .flat_map(|(names, _)| names)
+        .map(String::as_str)
+        .collect();
     let explained = [explained, vec!["robot", "task", "change"]].concat();
     let mut columns = 0;
     for args in [
@@ -314,7 +471,11 @@ fn every_column_of_a_test_and_of_an_audit_is_explained() {
         let lines: Vec<&str> = said.lines().collect();
         // A header stands above a rule.
         for pair in lines.windows(2).filter(|pair| pair[1].starts_with("--")) {
-            for column in pair[0].split("  ").map(str::trim).filter(|column| !column.is_empty()) {
+            for column in pair[0]
+                .split("  ")
+                .map(str::trim)
+                .filter(|column| !column.is_empty())
+            {
                 assert!(explained.contains(&column), "{column} is not explained");
                 columns += 1;
             }
@@ -329,45 +490,95 @@ fn rows_of_a_collected_sweep_are_numbers_or_null_for_programs() {
     let plan = "config = \"tiny.toml\"\nseeds = [1, 2]\n[vary]\nmap_elites.parents = [4]\n[eval]\nrobots = \
                 \"top:2\"\nimages = 4\n";
     sandbox.write("plan.toml", plan);
-    sandbox.run("sweep plan.toml --out all -q --task 1").ended(0, &[]);
-    let lines = sandbox.run("sweep plan.toml --out all --collect --json").ended(0, &["not all"]).json_lines();
-    let rows: Vec<_> = lines.iter().filter(|line| line["event"] == "collected").collect();
-    let [done, waiting] = rows.as_slice() else { panic!("{lines:?}") };
-    let eval: EvalFile = serde_json::from_str(&sandbox.read("all/tiny-parents=4-seed1/eval.json")).unwrap();
+    sandbox
+        .run("sweep plan.toml --out all -q --task 1")
+        .ended(0, &[]);
+    let lines = sandbox
+        .run("sweep plan.toml --out all --collect --json")
+        .ended(0, &["not all"])
+        .json_lines();
+    let rows: Vec<_> = lines
+        .iter()
+        .filter(|line| line["event"] == "collected")
+        .collect();
+    let [done, waiting] = rows.as_slice() else {
+        panic!("{lines:?}")
+    };
+    let eval: EvalFile =
+        serde_json::from_str(&sandbox.read("all/tiny-parents=4-seed1/eval.json")).unwrap();
     let mean = &eval.means["0|1"];
-    assert_eq!((done["number"].as_u64(), done["state"].as_str()), (Some(1), Some("done")));
-    assert_eq!((done["accuracy"].as_f64(), done["robots"].as_u64()), (Some(mean.accuracy), Some(2)));
+    assert_eq!(
+        (done["number"].as_u64(), done["state"].as_str()),
+        (Some(1), Some("done"))
+    );
+    assert_eq!(
+        (done["accuracy"].as_f64(), done["robots"].as_u64()),
+        (Some(mean.accuracy), Some(2))
+    );
     let ends = [&done["accuracy_low"], &done["accuracy_high"]].map(|end| end.as_f64());
     assert_eq!(ends, mean.interval.unwrap().map(Some));
-    assert_eq!(done["varied"], serde_json::json!({ "map_elites.parents": 4, "seed": 1 }));
-    assert_eq!((&waiting["state"], &waiting["accuracy"]), (&"waiting".into(), &serde_json::Value::Null));
+    assert_eq!(
+        done["varied"],
+        serde_json::json!({ "map_elites.parents": 4, "seed": 1 })
+    );
+    assert_eq!(
+        (&waiting["state"], &waiting["accuracy"]),
+        (&"waiting".into(), &serde_json::Value::Null)
+    );
     // The columns of the table.
     let table = sandbox.read("all/sweep.csv");
-    let columns = table.lines().next().unwrap().split(',').filter(|column| !column.starts_with("varied_"));
+    let columns = table
+        .lines()
+        .next()
+        .unwrap()
+        .split(',')
+        .filter(|column| !column.starts_with("varied_"));
     assert!(columns.clone().count() > 15);
     columns.for_each(|column| assert!(done.get(column).is_some(), "{column}"));
     // Nothing is empty, and every file is named.
-    let results: Vec<_> = lines.iter().filter(|line| line["event"] == "result").collect();
-    assert!(results.len() >= 3 && results.len() + rows.len() == lines.len(), "{lines:?}");
+    let results: Vec<_> = lines
+        .iter()
+        .filter(|line| line["event"] == "result")
+        .collect();
+    assert!(
+        results.len() >= 3 && results.len() + rows.len() == lines.len(),
+        "{lines:?}"
+    );
     assert_eq!(results[0]["file"], "all/sweep.csv");
-    assert!(results.iter().all(|line| line["text"] != "" && line["file"].is_string()), "{results:?}");
+    assert!(
+        results
+            .iter()
+            .all(|line| line["text"] != "" && line["file"].is_string()),
+        "{results:?}"
+    );
 }
 
 #[test]
 fn how_far_tasks_are_has_no_column_without_a_name() {
     let sandbox = Sandbox::tiny();
     sandbox.write("plan.toml", "config = \"tiny.toml\"\nseeds = [3]\n");
-    let status = || sandbox.run("sweep plan.toml --out all --status").ended(0, &[]).out;
+    let status = || {
+        sandbox
+            .run("sweep plan.toml --out all --status")
+            .ended(0, &[])
+            .out
+    };
     let plain = status();
     assert!(plain.lines().next().unwrap().ends_with("  left"), "{plain}");
-    assert!(plain.lines().all(|line| line.trim_end() == line), "{plain:?}");
+    assert!(
+        plain.lines().all(|line| line.trim_end() == line),
+        "{plain:?}"
+    );
     sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
     let path = "all/tiny-seed3/task.json";
     let mut task: serde_json::Value = serde_json::from_str(&sandbox.read(path)).unwrap();
     (task["state"], task["error"]) = ("failed".into(), "no room".into());
     sandbox.write(path, task.to_string());
     let failed = status();
-    assert!(failed.lines().next().unwrap().ends_with("  about"), "{failed}");
+    assert!(
+        failed.lines().next().unwrap().ends_with("  about"),
+        "{failed}"
+    );
     assert!(failed.contains("no room"), "{failed}");
 }
 
@@ -383,7 +594,10 @@ fn away_from_a_terminal_there_are_no_escape_sequences_with_or_without_no_color()
             let mut command = sandbox.command(args.split(' '));
             value.map(|value| command.env("NO_COLOR", value));
             let said = said(command);
-            assert!(!said.out.contains('\x1b') && !said.err.contains('\x1b'), "{said:?}");
+            assert!(
+                !said.out.contains('\x1b') && !said.err.contains('\x1b'),
+                "{said:?}"
+            );
         }
     }
 }
@@ -433,16 +647,26 @@ fn a_full_disk_is_an_error_and_is_said() {
         "--json gallery",
         "--help",
     ] {
-        let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+        let full = std::fs::File::options()
+            .write(true)
+            .open("/dev/full")
+            .unwrap();
         let mut command = std::process::Command::new(PROGRAM);
-        let ended =
-            command.current_dir(sandbox.path("")).args(args.split(' ')).stdout(full).output().unwrap();
+        let ended = command
+            .current_dir(sandbox.path(""))
+            .args(args.split(' '))
+            .stdout(full)
+            .output()
+            .unwrap();
         let err = String::from_utf8_lossy(&ended.stderr);
         assert!(
             !ended.status.success() && ended.status.code().is_some_and(|c| c != 101),
             "{args}: {ended:?}"
         );
-        assert!(err.contains("No space left") && !err.contains("panicked"), "{args}: {err}");
+        assert!(
+            err.contains("No space left") && !err.contains("panicked"),
+            "{args}: {err}"
+        );
     }
 }
 
@@ -473,7 +697,11 @@ fn an_instruction_set_that_is_not_there_is_an_error_that_names_those_that_are() 
     for (set, code) in [("avx1024", 2), ("", 0), ("baseline", 0)] {
         let mut command = sandbox.command(["gallery"]);
         command.env("MORPHCOG_ISA", set);
-        let words: &[&str] = if code == 2 { &["MORPHCOG_ISA=avx1024", "baseline"] } else { &[] };
+        let words: &[&str] = if code == 2 {
+            &["MORPHCOG_ISA=avx1024", "baseline"]
+        } else {
+            &[]
+        };
         said(command).ended(code, words);
     }
 }
@@ -484,26 +712,44 @@ fn a_shell_reads_the_commands_that_are_printed_whatever_the_path() {
     use std::ffi::OsStr;
     use std::os::unix::ffi::OsStrExt;
     let sandbox = Sandbox::tiny();
-    for name in [b"it's \"a\" $HOME `run`".as_slice(), b"-run", b"a|b;*\n", b"\xff\xfe"] {
+    for name in [
+        b"it's \"a\" $HOME `run`".as_slice(),
+        b"-run",
+        b"a|b;*\n",
+        b"\xff\xfe",
+    ] {
         let folder = OsStr::from_bytes(name);
         let out = [b"--out=", name].concat();
         let mut evolve = sandbox.command(["evolve", "-c", "tiny.toml"]);
         evolve.arg(OsStr::from_bytes(&out));
         let next = said(evolve).ended(0, &["next: "]).err;
-        let test = next.lines().find_map(|line| line.trim().strip_prefix("morphcog eval ")).unwrap();
+        let test = next
+            .lines()
+            .find_map(|line| line.trim().strip_prefix("morphcog eval "))
+            .unwrap();
         let mut unaudited = sandbox.command(["eval", "--physical-only"]);
         unaudited.arg(OsStr::from_bytes(&[b"--archive=", name].concat()));
         let hint = said(unaudited).ended(3, &["hint: `"]).err;
         let audit = hint.split_once("hint: `morphcog audit ").unwrap().1;
         let audit = audit.rsplit_once("` audits").unwrap().0;
-        for command in [format!("eval -q -n 4 --cycles 1 {test}"), format!("audit -q {audit}")] {
+        for command in [
+            format!("eval -q -n 4 --cycles 1 {test}"),
+            format!("audit -q {audit}"),
+        ] {
             let line = format!("{PROGRAM} {command}");
             let mut bash = std::process::Command::new("bash");
-            let ended = bash.args(["-c", &line]).current_dir(sandbox.path("")).output().unwrap();
+            let ended = bash
+                .args(["-c", &line])
+                .current_dir(sandbox.path(""))
+                .output()
+                .unwrap();
             assert!(ended.status.success(), "{command}: {ended:?}");
         }
         for file in ["eval.json", "audit.json"] {
-            assert!(sandbox.path("").join(folder).join(file).exists(), "{file} of {folder:?}");
+            assert!(
+                sandbox.path("").join(folder).join(file).exists(),
+                "{file} of {folder:?}"
+            );
         }
     }
 }

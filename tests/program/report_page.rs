@@ -13,7 +13,9 @@ fn a_click_on_a_cell_plays_its_robot() {
     let Some(program) = found() else { return };
     sandbox.write("tiny.toml", TINY);
     sandbox.run("evolve -q -c tiny.toml -o run").ended(0, &[]);
-    sandbox.run("eval -q --archive run/run.json --images 20 --cycles 1 --robots top:3").ended(0, &[]);
+    sandbox
+        .run("eval -q --archive run/run.json --images 20 --cycles 1 --robots top:3")
+        .ended(0, &[]);
     sandbox.run("report run").ended(0, &[]);
     let address = format!("file://{}", sandbox.path("run/report.html").display());
     let mut browser = Browser::start(&program, &sandbox);
@@ -31,8 +33,12 @@ fn a_click_on_a_cell_plays_its_robot() {
         assert_eq!(fittest, elites[0].id.as_str());
         // Another one, by a click; what is played is that one.
         let other = &elites[1].id;
-        tab.eval(&format!("document.querySelector('.cells [data-robot=\"{other}\"]').click()"));
-        tab.wait(&format!("document.querySelector('.about').textContent.startsWith('{other}')"));
+        tab.eval(&format!(
+            "document.querySelector('.cells [data-robot=\"{other}\"]').click()"
+        ));
+        tab.wait(&format!(
+            "document.querySelector('.about').textContent.startsWith('{other}')"
+        ));
         tab.wait(&format!(
             "{playing} && JSON.parse(document.querySelector('iframe').contentDocument\
              .getElementById('rollout').textContent).robot === '{other}'"
@@ -43,7 +49,10 @@ fn a_click_on_a_cell_plays_its_robot() {
         tab.key("ArrowRight", "");
         let second = "document.activeElement === document.querySelectorAll('.map button')[1]";
         assert_eq!(tab.eval(second), true);
-        let wide = tab.eval("document.documentElement.scrollWidth").as_u64().unwrap();
+        let wide = tab
+            .eval("document.documentElement.scrollWidth")
+            .as_u64()
+            .unwrap();
         assert!(wide <= u64::from(width), "{wide} pixels wide");
         assert_eq!(tab.complaints(), Vec::<String>::new());
         tab.close();
@@ -55,21 +64,31 @@ fn only_the_map_of_the_chosen_task_and_the_chosen_robot_are_seen() {
     let Some(program) = found() else { return };
     let sandbox = Sandbox::new();
     let tasks = TINY.replace("groups = [[0], [1]]", "splits = [0, 1, 2]");
-    sandbox.write("tasks.toml", tasks.replace("train_images = [0, 1]", "images_per_class = 1"));
+    sandbox.write(
+        "tasks.toml",
+        tasks.replace("train_images = [0, 1]", "images_per_class = 1"),
+    );
     sandbox.run("evolve -q -c tasks.toml -o run").ended(0, &[]);
     sandbox.run("report -q run --rollouts 2").ended(0, &[]);
     let mut browser = Browser::start(&program, &sandbox);
     let mut tab = browser.tab(1280, 900, false);
-    tab.open(&format!("file://{}", sandbox.path("run/report.html").display()));
+    tab.open(&format!(
+        "file://{}",
+        sandbox.path("run/report.html").display()
+    ));
     let playing = "document.querySelector('iframe')?.contentDocument?.getElementById('label')";
     tab.wait(playing);
     // One map at a time.
     let seen = "[...document.querySelectorAll('.map')].filter((map) => map.offsetHeight > 0)\
                 .map((map) => map.dataset.task).join()";
     // At first that of the robot that is played.
-    let first = tab.eval("document.querySelector('[data-first]').closest('[data-task]').dataset.task");
+    let first =
+        tab.eval("document.querySelector('[data-first]').closest('[data-task]').dataset.task");
     assert_eq!(tab.eval(seen), first);
-    let tasks = tab.eval("document.querySelector('select.task').options.length").as_u64().unwrap();
+    let tasks = tab
+        .eval("document.querySelector('select.task').options.length")
+        .as_u64()
+        .unwrap();
     assert!(tasks > 1, "{tasks}");
     for task in (0..tasks).rev() {
         tab.eval(&format!(
@@ -81,8 +100,12 @@ fn only_the_map_of_the_chosen_task_and_the_chosen_robot_are_seen() {
     // Of a robot whose rollout is not there, or is damaged, no other one is seen in its place.
     let height = "document.querySelector('iframe').offsetHeight";
     let mut click = |robot: &str, says: &str, is_seen: bool| {
-        tab.eval(&format!("document.querySelector('button[data-robot]{robot}').click()"));
-        tab.wait(&format!("document.querySelector('.about').textContent.includes('{says}')"));
+        tab.eval(&format!(
+            "document.querySelector('button[data-robot]{robot}').click()"
+        ));
+        tab.wait(&format!(
+            "document.querySelector('.about').textContent.includes('{says}')"
+        ));
         assert_eq!(tab.eval(&format!("{height} > 0")), is_seen, "{robot}");
     };
     click("[data-rollout=\"\"]", "not in this report", false);
@@ -92,7 +115,9 @@ fn only_the_map_of_the_chosen_task_and_the_chosen_robot_are_seen() {
     tab.eval(&format!(
         "document.getElementById(document.querySelector('button{damaged}').dataset.rollout).textContent = 'AAAA'"
     ));
-    tab.eval(&format!("document.querySelector('button{damaged}').click()"));
+    tab.eval(&format!(
+        "document.querySelector('button{damaged}').click()"
+    ));
     tab.wait("document.querySelector('.about').textContent.includes('cannot unpack')");
     assert_eq!(tab.eval(height), 0);
     assert_eq!(tab.complaints(), Vec::<String>::new());
@@ -104,8 +129,12 @@ fn a_team_walks_on_the_page_and_says_there_what_it_said_in_its_test() {
     let Some(program) = found() else { return };
     let sandbox = pairs();
     let runs = "--archive pairs/0v1 pairs/0v4 pairs/1v4";
-    sandbox.run(&format!("team -q {runs} --classes 0,1,4 --images 6")).ended(0, &[]);
-    sandbox.run(&format!("report -q {runs} --rollouts 3")).ended(0, &[]);
+    sandbox
+        .run(&format!("team -q {runs} --classes 0,1,4 --images 6"))
+        .ended(0, &[]);
+    sandbox
+        .run(&format!("report -q {runs} --rollouts 3"))
+        .ended(0, &[]);
     let team = TeamFile::read(&sandbox.path("pairs/team.json")).unwrap();
     let answers = team.answers.unwrap().votes.answers;
     let address = format!("file://{}", sandbox.path("pairs/report.html").display());
@@ -116,17 +145,31 @@ fn a_team_walks_on_the_page_and_says_there_what_it_said_in_its_test() {
         tab.wait("document.querySelectorAll('#team .stages figure').length === 3");
         tab.wait("document.querySelector('#team .says').textContent.startsWith('step ')");
         for (number, class) in team.classes.iter().enumerate() {
-            let place = team.images.iter().position(|image| image.label == *class).unwrap();
-            tab.eval(&format!("document.querySelectorAll('#team .watch button')[{number}].click()"));
-            tab.wait(&format!("document.getElementById('team').dataset.walks === 'team-{number}'"));
+            let place = team
+                .images
+                .iter()
+                .position(|image| image.label == *class)
+                .unwrap();
+            tab.eval(&format!(
+                "document.querySelectorAll('#team .watch button')[{number}].click()"
+            ));
+            tab.wait(&format!(
+                "document.getElementById('team').dataset.walks === 'team-{number}'"
+            ));
             let end = "const time = document.querySelector('#team input'); time.value = time.max; \
                        time.dispatchEvent(new Event('input'))";
             tab.eval(&format!("(() => {{ {end} }})()"));
-            let verdict = if answers[place] == *class { "correct" } else { "wrong" };
-            assert_eq!(tab.text("#team .says"), format!("step 500 says {}: {verdict}", answers[place]));
+            let verdict = if answers[place] == *class {
+                "correct"
+            } else {
+                "wrong"
+            };
+            assert_eq!(
+                tab.text("#team .says"),
+                format!("step 500 says {}: {verdict}", answers[place])
+            );
             // Who walked farther than the threshold has voted.
-            let turned =
-                "document.querySelectorAll('#team figure:is([data-way=left], [data-way=right])').length";
+            let turned = "document.querySelectorAll('#team figure:is([data-way=left], [data-way=right])').length";
             let voted = team
                 .members
                 .iter()
@@ -134,13 +177,18 @@ fn a_team_walks_on_the_page_and_says_there_what_it_said_in_its_test() {
             assert_eq!(tab.eval(turned), voted.count());
         }
         keep_picture(&format!("report-team-{width}.png"), &tab.screenshot());
-        let wide = tab.eval("document.documentElement.scrollWidth").as_u64().unwrap();
+        let wide = tab
+            .eval("document.documentElement.scrollWidth")
+            .as_u64()
+            .unwrap();
         assert!(wide <= u64::from(width), "{wide} pixels wide");
         assert_eq!(tab.complaints(), Vec::<String>::new());
         tab.close();
     }
     // A team of other runs is not theirs.
-    let said = sandbox.run("report --archive pairs/0v1 pairs/0v4 --rollouts 0").ended(0, &[]);
+    let said = sandbox
+        .run("report --archive pairs/0v1 pairs/0v4 --rollouts 0")
+        .ended(0, &[]);
     assert!(said.err.contains("team.json: "), "{}", said.err);
 }
 
@@ -152,22 +200,37 @@ fn letters() -> Sandbox {
         let label = |image: u8| 1 + image % 26;
         let is_ink = |image: u8, pixel: u8| u32::from(pixel / 3) * u32::from(label(image)) % 7 < 3;
         let pixel = |image: u8, pixel: u8| if is_ink(image, pixel) { 255 } else { image };
-        let pixels: Vec<u8> = (0..count).flat_map(|image| (0..100).map(move |p| pixel(image, p))).collect();
+        let pixels: Vec<u8> = (0..count)
+            .flat_map(|image| (0..100).map(move |p| pixel(image, p)))
+            .collect();
         let header = [0, 0, 8, 3, 0, 0, 0, count, 0, 0, 0, 10, 0, 0, 0, 10];
-        sandbox.write(&format!("letters/{split}-images-idx3-ubyte"), [&header[..], &pixels].concat());
+        sandbox.write(
+            &format!("letters/{split}-images-idx3-ubyte"),
+            [&header[..], &pixels].concat(),
+        );
         let header = [0, 0, 8, 1, 0, 0, 0, count];
         let labels: Vec<u8> = (0..count).map(label).collect();
-        sandbox.write(&format!("letters/{split}-labels-idx1-ubyte"), [&header[..], &labels].concat());
+        sandbox.write(
+            &format!("letters/{split}-labels-idx1-ubyte"),
+            [&header[..], &labels].concat(),
+        );
     }
     let groups = [vec![1], vec![13], vec![26], (1..=13).collect::<Vec<u8>>()];
     for (number, first) in groups.into_iter().enumerate() {
         let rest: Vec<u8> = (1..=26).filter(|class| !first.contains(class)).collect();
         let config = TINY
-            .replace("groups = [[0], [1]]", &format!("groups = [{first:?}, {rest:?}]"))
+            .replace(
+                "groups = [[0], [1]]",
+                &format!("groups = [{first:?}, {rest:?}]"),
+            )
             .replace("dataset = \"builtin\"", "dataset = \"letters\"")
             .replace("train_images = [0, 1]", "images_per_class = 1");
         sandbox.write("run.toml", config);
-        sandbox.run(&format!("evolve -q -c run.toml -g 3 --data letters -o runs/{number}")).ended(0, &[]);
+        sandbox
+            .run(&format!(
+                "evolve -q -c run.toml -g 3 --data letters -o runs/{number}"
+            ))
+            .ended(0, &[]);
     }
     sandbox
 }
@@ -177,15 +240,23 @@ fn with_26_classes_nothing_on_the_page_covers_anything_else() {
     let Some(program) = found() else { return };
     let sandbox = letters();
     let runs = "--archive runs/0 runs/1 runs/2 runs/3";
-    sandbox.run("eval -q --archive runs/3 --images 26 --robots top:3").ended(0, &[]);
-    sandbox.run(&format!("team -q {runs} --images 104")).ended(0, &[]);
-    sandbox.run(&format!("report -q {runs} --rollouts 1")).ended(0, &[]);
+    sandbox
+        .run("eval -q --archive runs/3 --images 26 --robots top:3")
+        .ended(0, &[]);
+    sandbox
+        .run(&format!("team -q {runs} --images 104"))
+        .ended(0, &[]);
+    sandbox
+        .run(&format!("report -q {runs} --rollouts 1"))
+        .ended(0, &[]);
     let address = format!("file://{}", sandbox.path("runs/report.html").display());
     let mut browser = Browser::start(&program, &sandbox);
     for (width, height, dark) in [(1280, 900, false), (390, 844, true)] {
         let mut tab = browser.tab(width, height, dark);
         tab.open(&address);
-        tab.wait("document.querySelector('.stages figcaption') && document.querySelector('.tally li')");
+        tab.wait(
+            "document.querySelector('.stages figcaption') && document.querySelector('.tally li')",
+        );
         keep_picture(&format!("report-26-{width}.png"), &tab.screenshot());
         // Words of a figure, what stands beside each other, and what stands in a button.
         let covered = "(() => {
@@ -207,7 +278,10 @@ fn with_26_classes_nothing_on_the_page_covers_anything_else() {
            return found;
          })()";
         assert_eq!(tab.eval(covered), serde_json::json!([]), "{width} pixels");
-        let wide = tab.eval("document.documentElement.scrollWidth").as_u64().unwrap();
+        let wide = tab
+            .eval("document.documentElement.scrollWidth")
+            .as_u64()
+            .unwrap();
         assert!(wide <= u64::from(width), "{wide} pixels wide");
         assert_eq!(tab.complaints(), Vec::<String>::new());
         tab.close();

@@ -33,7 +33,9 @@ fn draw(tab: &mut Tab, line: &[[f64; 2]]) {
 fn on_pad(tab: &mut Tab, line: &[[f64; 2]]) -> Vec<[f64; 2]> {
     tab.click("#clear");
     let [x, y, width, height] = tab.place("#pad");
-    line.iter().map(|[c, r]| [x + c / 28.0 * width, y + r / 28.0 * height]).collect()
+    line.iter()
+        .map(|[c, r]| [x + c / 28.0 * width, y + r / 28.0 * height])
+        .collect()
 }
 
 fn zero() -> Vec<[f64; 2]> {
@@ -45,7 +47,10 @@ fn zero() -> Vec<[f64; 2]> {
 }
 
 fn one() -> Vec<[f64; 2]> {
-    (0..=12).map(|k| f64::from(k) / 12.0).map(|t| [16.0 - 4.0 * t, 5.0 + 18.0 * t]).collect()
+    (0..=12)
+        .map(|k| f64::from(k) / 12.0)
+        .map(|t| [16.0 - 4.0 * t, 5.0 + 18.0 * t])
+        .collect()
 }
 
 /// The robot that the page begins with.
@@ -56,7 +61,9 @@ fn best() -> String {
 
 /// Simulates without waiting for real time.
 fn as_fast_as_possible(tab: &mut Tab) {
-    tab.eval("(() => { const s = document.getElementById('speed'); s.value = '0'; s.onchange(); })()");
+    tab.eval(
+        "(() => { const s = document.getElementById('speed'); s.value = '0'; s.onchange(); })()",
+    );
 }
 
 /// A page of its own at the usual size, without waiting for real time.
@@ -73,7 +80,9 @@ fn choose(tab: &mut Tab, archive: &str) {
     tab.eval(&format!(
         "(() => {{ const s = document.getElementById('archive'); s.value = '{archive}'; s.onchange(); }})()"
     ));
-    tab.wait(&format!("document.getElementById('who').textContent !== '{first}'"));
+    tab.wait(&format!(
+        "document.getElementById('who').textContent !== '{first}'"
+    ));
 }
 
 /// Waits for the end of the simulation under the picture that was chosen last.
@@ -109,7 +118,10 @@ fn a_drawn_zero_and_a_drawn_one_are_told_apart_and_the_page_fits_everywhere() {
     let (says, moved) = answer(&mut tab, &one());
     assert!(says == "1" && moved.ends_with("left"), "{says}: {moved}");
     let spoken = tab.text("#spoken");
-    assert!(spoken.starts_with("QMAXD sees your drawing. It says 1: moved "), "{spoken}");
+    assert!(
+        spoken.starts_with("QMAXD sees your drawing. It says 1: moved "),
+        "{spoken}"
+    );
 
     // The same without a mouse: the pen is put down, moved and lifted by keys.
     tab.click("#clear");
@@ -119,7 +131,10 @@ fn a_drawn_zero_and_a_drawn_one_are_told_apart_and_the_page_fits_everywhere() {
     tab.key(" ", " ");
     at_end(&mut tab);
     let by_keys = tab.text("#spoken");
-    assert!(by_keys.starts_with("QMAXD sees your drawing.") && by_keys != spoken, "{by_keys}");
+    assert!(
+        by_keys.starts_with("QMAXD sees your drawing.") && by_keys != spoken,
+        "{by_keys}"
+    );
 
     // Another robot, a test image of a known class, the editor.
     tab.click("[data-robot=YJTLA]");
@@ -128,7 +143,10 @@ fn a_drawn_zero_and_a_drawn_one_are_told_apart_and_the_page_fits_everywhere() {
     tab.click("#thumbs button");
     at_end(&mut tab);
     let judged = tab.eval("document.getElementById('verdict').dataset.state");
-    assert!(["right", "wrong", "none"].contains(&judged.as_str().unwrap()), "{judged}");
+    assert!(
+        ["right", "wrong", "none"].contains(&judged.as_str().unwrap()),
+        "{judged}"
+    );
     tab.click("#tab-editor");
     tab.wait("document.getElementById('checked').dataset.state === 'good'");
     tab.click("#live");
@@ -145,7 +163,10 @@ fn a_drawn_zero_and_a_drawn_one_are_told_apart_and_the_page_fits_everywhere() {
         let mut tab = browser.tab(width, height, dark);
         open(&mut tab, &server);
         tab.wait("document.getElementById('moved').textContent.startsWith('moved')");
-        let wide = tab.eval("document.documentElement.scrollWidth").as_u64().unwrap();
+        let wide = tab
+            .eval("document.documentElement.scrollWidth")
+            .as_u64()
+            .unwrap();
         assert!(wide <= u64::from(width), "{wide} pixels wide");
         // Nothing that can be used sticks out, and all of it has a name.
         let nameless = "[...document.querySelectorAll('button, select, input, canvas')].filter((e) => \
@@ -172,13 +193,21 @@ fn by_hand(digit: u8, dice: &mut Dice) -> Vec<[f64; 2]> {
             let (width, begin, turn) = (within(0.5, 0.95), within(0.0, TAU), within(0.94, 1.06));
             let way = if within(0.0, 1.0) < 0.5 { 1.0 } else { -1.0 };
             let at = |k: u32| begin + way * turn * TAU * f64::from(k) / 18.0;
-            (0..=18).map(|k| [0.5 * width * at(k).sin(), -0.5 * at(k).cos()]).collect()
+            (0..=18)
+                .map(|k| [0.5 * width * at(k).sin(), -0.5 * at(k).cos()])
+                .collect()
         }
         _ => {
             // With a flag or without.
             let (flag, bend) = (within(-0.2, 0.25), within(-0.04, 0.04));
-            let stem = (0..=6).map(|k| f64::from(k) / 6.0).map(|t| [bend * (TAU * t / 2.0).sin(), t - 0.5]);
-            let begin = if flag > 0.0 { vec![[-flag, -0.5 + 0.8 * flag]] } else { Vec::new() };
+            let stem = (0..=6)
+                .map(|k| f64::from(k) / 6.0)
+                .map(|t| [bend * (TAU * t / 2.0).sin(), t - 0.5]);
+            let begin = if flag > 0.0 {
+                vec![[-flag, -0.5 + 0.8 * flag]]
+            } else {
+                Vec::new()
+            };
             begin.into_iter().chain(stem).collect()
         }
     };
@@ -214,7 +243,12 @@ fn digits_drawn_in_any_size_place_and_slant_are_read_by_the_robot_that_the_page_
             wrong.push(format!("drawing {number}: a {digit} is {says:?}, {moved}"));
         }
     }
-    assert!(wrong.is_empty(), "{} of 8 wrong:\n{}", wrong.len(), wrong.join("\n"));
+    assert!(
+        wrong.is_empty(),
+        "{} of 8 wrong:\n{}",
+        wrong.len(),
+        wrong.join("\n")
+    );
 }
 
 #[test]
@@ -236,7 +270,10 @@ fn a_drawing_is_fitted_unless_that_is_turned_off(tab: &mut Tab) {
     tab.eval("window.scrollTo(0, 0)");
     keep_picture("serve.png", &tab.screenshot());
     // As drawn, it is another picture.
-    let small: Vec<[f64; 2]> = zero().iter().map(|place| place.map(|v| 2.0 + v / 4.0)).collect();
+    let small: Vec<[f64; 2]> = zero()
+        .iter()
+        .map(|place| place.map(|v| 2.0 + v / 4.0))
+        .collect();
     draw(tab, &small);
     at_end(tab);
     let lit = "JSON.stringify([...document.getElementById('stimulus').getContext('2d')\
@@ -259,7 +296,10 @@ fn a_stroke_goes_on_when_the_pointer_is_taken_away_and_ends_when_it_is_up(tab: &
     tab.eval("document.getElementById('pad').releasePointerCapture(1)");
     tab.trace(rest);
     tab.release(rest[20]);
-    assert!(tab.eval(ink) == whole, "the stroke ended when the pointer was taken away");
+    assert!(
+        tab.eval(ink) == whole,
+        "the stroke ended when the pointer was taken away"
+    );
     // It was lifted where the page does not learn of it: nothing is drawn any more.
     tab.press(line[0]);
     tab.eval(
@@ -275,7 +315,11 @@ fn what_was_erased_is_not_seen_at_any_size_of_the_drawing(tab: &mut Tab) {
     for (line, erased, rows) in [
         ("[[14, 6], [14, 16]]", "[[14, 6], [14, 8]]", 19..=22),
         ("[[2, 14], [26, 14]]", "[[0, 14], [28, 14]]", 0..=0),
-        ("[[1, 14], [27, 14]]", "[[0, 11], [28, 11], [28, 16], [0, 16]]", 0..=28),
+        (
+            "[[1, 14], [27, 14]]",
+            "[[0, 11], [28, 11], [28, 16], [0, 16]]",
+            0..=28,
+        ),
     ] {
         let seen = tab.eval(&format!(
             "import('/pad.js').then(({{ Pad }}) => {{
@@ -285,9 +329,17 @@ fn what_was_erased_is_not_seen_at_any_size_of_the_drawing(tab: &mut Tab) {
              }})"
         ));
         let is_dark = |row: &Value| {
-            row.as_array().unwrap().iter().any(|pixel| pixel.as_f64().expect("a number") > 127.0)
+            row.as_array()
+                .unwrap()
+                .iter()
+                .any(|pixel| pixel.as_f64().expect("a number") > 127.0)
         };
-        let dark = seen.as_array().unwrap().iter().filter(|row| is_dark(row)).count();
+        let dark = seen
+            .as_array()
+            .unwrap()
+            .iter()
+            .filter(|row| is_dark(row))
+            .count();
         assert!(rows.contains(&dark), "{line} without {erased}: {dark} rows");
     }
 }
@@ -309,7 +361,9 @@ fn a_run_that_begins_while_the_page_is_open_appears_grows_and_ends_on_it() {
     tab.wait("document.querySelectorAll('#curves svg').length === 3");
     tab.wait("document.getElementById('course').textContent.includes('left')");
     let first = tab.text("#course");
-    tab.wait(&format!("document.getElementById('course').textContent !== '{first}'"));
+    tab.wait(&format!(
+        "document.getElementById('course').textContent !== '{first}'"
+    ));
     tab.eval("document.getElementById('progress').scrollIntoView()");
     keep_picture("serve-live.png", &tab.screenshot());
     terminate(&child);
@@ -325,7 +379,8 @@ fn below_the_prefix_of_a_proxy_and_by_a_name_that_is_allowed_all_of_the_page_wor
         return;
     };
     // Two tasks are a team.
-    let other = "--set task.groups=[[0],[2]] --set data.train_images= --set data.images_per_class=1";
+    let other =
+        "--set task.groups=[[0],[2]] --set data.train_images= --set data.images_per_class=1";
     for (name, task) in [("one", ""), ("two", other)] {
         sandbox
             .run(&format!(
@@ -334,10 +389,17 @@ fn below_the_prefix_of_a_proxy_and_by_a_name_that_is_allowed_all_of_the_page_wor
             .ended(0, &[]);
     }
     // Browsers take names that end so for this machine; the server does not by itself.
-    let server = Server::start(&sandbox, "--allow-host hub.localhost --archive runs/one runs/two");
+    let server = Server::start(
+        &sandbox,
+        "--allow-host hub.localhost --archive runs/one runs/two",
+    );
     let proxy = Proxy::start(&server);
     let mut tab = browser.tab(1280, 900, false);
-    tab.open(&format!("http://hub.localhost:{}{}/", proxy.port, Proxy::PREFIX));
+    tab.open(&format!(
+        "http://hub.localhost:{}{}/",
+        proxy.port,
+        Proxy::PREFIX
+    ));
     tab.wait("document.documentElement?.dataset.ready === 'yes'");
     as_fast_as_possible(&mut tab);
     let (says, _) = answer(&mut tab, &zero());
@@ -372,8 +434,18 @@ fn an_audit_that_appears_while_the_page_is_open_is_said_and_can_be_chosen_by() {
     // With verdicts of two kinds, and a reason to look for.
     let with_reason = |reason: &str| {
         let mut audit = audit.clone();
-        for (number, robot) in audit["robots"].as_array_mut().unwrap().iter_mut().enumerate() {
-            robot["verdict"] = if number % 2 == 0 { "exploits" } else { "fragile" }.into();
+        for (number, robot) in audit["robots"]
+            .as_array_mut()
+            .unwrap()
+            .iter_mut()
+            .enumerate()
+        {
+            robot["verdict"] = if number % 2 == 0 {
+                "exploits"
+            } else {
+                "fragile"
+            }
+            .into();
             robot["reason"] = reason.into();
         }
         audit.to_string()
@@ -382,7 +454,8 @@ fn an_audit_that_appears_while_the_page_is_open_is_said_and_can_be_chosen_by() {
     let mut tab = browser.tab(1280, 900, false);
     open(&mut tab, &server);
     choose(&mut tab, "3");
-    let begun = || serde_json::from_str::<Value>(&server.get("/api/status").body).unwrap()["begun"].clone();
+    let begun =
+        || serde_json::from_str::<Value>(&server.get("/api/status").body).unwrap()["begun"].clone();
     let (who, before) = (tab.text("#who"), begun());
     assert_eq!(tab.eval("document.getElementById('audit').hidden"), true);
     sandbox.write("run/audit.json", with_reason("seen once"));
@@ -398,7 +471,10 @@ fn an_audit_that_appears_while_the_page_is_open_is_said_and_can_be_chosen_by() {
     sandbox.write("run/audit.json", with_reason("seen once more"));
     tab.wait("document.getElementById('about').textContent.includes('seen once more')");
     assert_eq!(
-        (tab.eval("document.getElementById('audit').value"), tab.text("#count")),
+        (
+            tab.eval("document.getElementById('audit').value"),
+            tab.text("#count")
+        ),
         ("fragile".into(), few)
     );
     assert_eq!((tab.text("#who"), begun()), (who, before));
@@ -428,8 +504,13 @@ fn a_body_that_is_built_and_its_robot_are_in_sight_together_and_the_simulation_e
          document.getElementById('play').getBoundingClientRect().top",
     );
     for id in ["grid", "world", "verdict"] {
-        let bottom = tab.eval(&format!("document.getElementById('{id}').getBoundingClientRect().bottom"));
-        assert!((1.0..=800.0).contains(&bottom.as_f64().unwrap()), "{id} ends at {bottom}");
+        let bottom = tab.eval(&format!(
+            "document.getElementById('{id}').getBoundingClientRect().bottom"
+        ));
+        assert!(
+            (1.0..=800.0).contains(&bottom.as_f64().unwrap()),
+            "{id} ends at {bottom}"
+        );
     }
     keep_picture("serve-editor.png", &tab.screenshot());
 
@@ -480,7 +561,9 @@ fn a_team_walks_on_small_stages_and_its_votes_are_counted() {
     };
     // All three are called tiny, and have one seed.
     for (name, pair) in [("a", "0v1"), ("b", "0v2"), ("c", "1v2")] {
-        let (mut run, _) = published::trained(&format!("{TEAM}-{pair}")).unwrap().remove(0);
+        let (mut run, _) = published::trained(&format!("{TEAM}-{pair}"))
+            .unwrap()
+            .remove(0);
         (run.name, run.config.seed) = ("tiny".to_string(), 3);
         sandbox.write(&format!("{name}/run.json"), run.to_json());
     }
@@ -491,7 +574,10 @@ fn a_team_walks_on_small_stages_and_its_votes_are_counted() {
         as_fast_as_possible(&mut tab);
         let alone = tab.text("#who");
         let names = "new Set([...document.getElementById('archive').options].map((o) => o.textContent)).size";
-        assert_eq!(tab.eval(names), tab.eval("document.getElementById('archive').options.length"));
+        assert_eq!(
+            tab.eval(names),
+            tab.eval("document.getElementById('archive').options.length")
+        );
         tab.click("#tab-team");
         assert_eq!(tab.text("#who"), "The team");
         tab.wait("document.querySelectorAll('#stages figure').length === 3");
@@ -500,10 +586,8 @@ fn a_team_walks_on_small_stages_and_its_votes_are_counted() {
             draw(&mut tab, &zero());
         }
         at_end(&mut tab);
-        let votes =
-            "[...document.querySelectorAll('#tally span')].reduce((sum, cell) => sum + +cell.textContent, 0)";
-        let turned =
-            "document.querySelectorAll('#stages figure:is([data-way=left], [data-way=right])').length";
+        let votes = "[...document.querySelectorAll('#tally span')].reduce((sum, cell) => sum + +cell.textContent, 0)";
+        let turned = "document.querySelectorAll('#stages figure:is([data-way=left], [data-way=right])').length";
         let counted = tab.eval(votes);
         assert_eq!(counted, tab.eval(turned));
         let fits = "document.documentElement.scrollWidth <= window.innerWidth";
@@ -513,12 +597,18 @@ fn a_team_walks_on_small_stages_and_its_votes_are_counted() {
             assert!(counted.as_u64() > Some(0), "nobody votes");
             assert_eq!(tab.text("#says"), "0");
             let spoken = tab.text("#spoken");
-            assert!(spoken.starts_with("The team sees your drawing. It says "), "{spoken}");
+            assert!(
+                spoken.starts_with("The team sees your drawing. It says "),
+                "{spoken}"
+            );
             // Back to a robot by itself.
             tab.click("#tab-robots");
             at_end(&mut tab);
             assert_eq!(
-                (tab.text("#who"), tab.eval("document.getElementById('together').hidden")),
+                (
+                    tab.text("#who"),
+                    tab.eval("document.getElementById('together').hidden")
+                ),
                 (alone, true.into())
             );
         }

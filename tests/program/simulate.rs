@@ -28,7 +28,11 @@ fn rows(csv: &str) -> Vec<[f64; 2]> {
     assert_eq!(lines.next(), Some("step,com_x,com_y"));
     let row = |(number, line): (usize, &str)| {
         let fields: Vec<&str> = line.split(',').collect();
-        assert_eq!((fields.len(), fields[0]), (3, number.to_string().as_str()), "{line}");
+        assert_eq!(
+            (fields.len(), fields[0]),
+            (3, number.to_string().as_str()),
+            "{line}"
+        );
         let digits = |text: &str| text.chars().filter(char::is_ascii_digit).count();
         assert!(fields[1..].iter().all(|text| digits(text) >= 17), "{line}");
         [fields[1], fields[2]].map(|text| text.parse().unwrap())
@@ -39,7 +43,10 @@ fn rows(csv: &str) -> Vec<[f64; 2]> {
 fn agree(ours: &[[f64; 2]], theirs: &[[f64; 2]]) {
     assert_eq!(ours.len(), theirs.len());
     for (a, b) in ours.iter().zip(theirs) {
-        assert!((a[0] - b[0]).abs() < 1e-7 && (a[1] - b[1]).abs() < 1e-7, "{a:?} and {b:?}");
+        assert!(
+            (a[0] - b[0]).abs() < 1e-7 && (a[1] - b[1]).abs() < 1e-7,
+            "{a:?} and {b:?}"
+        );
     }
 }
 
@@ -50,7 +57,9 @@ fn simulate_agrees_with_a_reference_trajectory() {
     let printed = sandbox.run("simulate scenario.json").ended(0, &[]);
     assert!(printed.err.is_empty(), "{}", printed.err);
     agree(&rows(&printed.out), &rollout.com);
-    let written = sandbox.run("simulate scenario.json --out traj.csv").ended(0, &[]);
+    let written = sandbox
+        .run("simulate scenario.json --out traj.csv")
+        .ended(0, &[]);
     assert!(written.out.is_empty());
     assert_eq!(sandbox.read("traj.csv"), printed.out);
 }
@@ -60,24 +69,55 @@ fn simulate_reads_standard_input_and_writes_every_point_and_pixel() {
     let sandbox = Sandbox::new();
     let scenario = "{\"body\": [[3, 6], [4, 0]], \"stimuli\": [[[0, 0.5], [0, 0]], [[1, 1], [1, 1]]], \
      \"switch_every\": 3}";
-    let told =
-        |args: &str, input: &str| said_of(sandbox.command(args.split(' ')), input, Duration::from_secs(60));
+    let told = |args: &str, input: &str| {
+        said_of(
+            sandbox.command(args.split(' ')),
+            input,
+            Duration::from_secs(60),
+        )
+    };
     let printed = told("simulate - --points", scenario).ended(0, &[]);
-    let table: Vec<Vec<&str>> = printed.out.lines().map(|line| line.split(',').collect()).collect();
+    let table: Vec<Vec<&str>> = printed
+        .out
+        .lines()
+        .map(|line| line.split(',').collect())
+        .collect();
     let names = "step,com_x,com_y,x_0,y_0,x_1,y_1,x_2,y_2,x_3,y_3,x_4,y_4,x_5,y_5,x_6,y_6,x_7,y_7,\
                  pixel_0_0,pixel_0_1,pixel_1_0,pixel_1_1";
     assert_eq!((table[0].join(",").as_str(), table.len()), (names, 8));
     for row in &table[1..] {
         let numbers: Vec<f64> = row.iter().map(|text| text.parse().unwrap()).collect();
-        let mean = |axis: usize| (0..8).map(|point| numbers[3 + 2 * point + axis]).sum::<f64>() / 8.0;
-        assert!((mean(0) - numbers[1]).abs() < 1e-9 && (mean(1) - numbers[2]).abs() < 1e-9, "{row:?}");
+        let mean = |axis: usize| {
+            (0..8)
+                .map(|point| numbers[3 + 2 * point + axis])
+                .sum::<f64>()
+                / 8.0
+        };
+        assert!(
+            (mean(0) - numbers[1]).abs() < 1e-9 && (mean(1) - numbers[2]).abs() < 1e-9,
+            "{row:?}"
+        );
     }
     let pixels: Vec<String> = table[1..].iter().map(|row| row[19..].join(" ")).collect();
-    assert_eq!(pixels, ["0 0 0 0", "0 0.5 0 0", "0 0.5 0 0", "0 0.5 0 0", "1 1 1 1", "1 1 1 1", "1 1 1 1"]);
+    assert_eq!(
+        pixels,
+        [
+            "0 0 0 0",
+            "0 0.5 0 0",
+            "0 0.5 0 0",
+            "0 0.5 0 0",
+            "1 1 1 1",
+            "1 1 1 1",
+            "1 1 1 1"
+        ]
+    );
     // The centre is the same without them.
     sandbox.write("s.json", scenario);
     let plain = sandbox.run("simulate s.json").ended(0, &[]).out;
-    let centres = table.iter().map(|row| row[..3].join(",") + "\n").collect::<String>();
+    let centres = table
+        .iter()
+        .map(|row| row[..3].join(",") + "\n")
+        .collect::<String>();
     assert_eq!(plain, centres);
     told("simulate -", "{\"body\": [[9]]}").ended(3, &["standard input", "body"]);
 }
@@ -90,16 +130,20 @@ fn an_unstable_rollout_ends_with_4_after_its_rows_and_says_when() {
     agree(&rows(&said.out), &rollout.com);
     let last = said.err.lines().last().unwrap();
     assert!(last.contains("control step 70"), "{last}");
-    sandbox.run("simulate scenario.json -o traj.csv").ended(4, &["control step 70"]);
+    sandbox
+        .run("simulate scenario.json -o traj.csv")
+        .ended(4, &["control step 70"]);
     assert_eq!(sandbox.read("traj.csv"), said.out);
 }
 
 #[test]
 fn contacts_without_offset_or_stiffness_blow_nothing_up() {
     let sandbox = Sandbox::new();
-    for physics in
-        ["\"contact_offset\": 0", "\"contact_stiffness\": 0", "\"contact_damping\": 0, \"friction\": 0"]
-    {
+    for physics in [
+        "\"contact_offset\": 0",
+        "\"contact_stiffness\": 0",
+        "\"contact_damping\": 0, \"friction\": 0",
+    ] {
         let body = "[[3, 3, 6], [4, 2, 5]]";
         sandbox.write(
             "s.json",
@@ -118,15 +162,27 @@ fn simulate_switches_stimuli_and_resets_when_asked() {
     };
     let body = r#""body": [[6, 4, 5], [3, 0, 3]]"#;
     let [a, b] = ["[[1, 0, 0.5], [0, 0, 0]]", "[[0, 1, 1], [0, 0, 0]]"];
-    let alone = |stimulus: &str| run(&format!("{{{body}, \"stimulus\": {stimulus}, \"control_steps\": 9}}"));
-    let fresh =
-        run(&format!("{{{body}, \"stimuli\": [{a}, {b}], \"switch_every\": 9, \"reset_between\": true}}"));
+    let alone = |stimulus: &str| {
+        run(&format!(
+            "{{{body}, \"stimulus\": {stimulus}, \"control_steps\": 9}}"
+        ))
+    };
+    let fresh = run(&format!(
+        "{{{body}, \"stimuli\": [{a}, {b}], \"switch_every\": 9, \"reset_between\": true}}"
+    ));
     let (first, second) = (alone(a), alone(b));
-    assert_eq!((fresh.len(), &fresh[..10], &fresh[10..]), (19, &first[..], &second[1..]));
-    let continuous = run(&format!("{{{body}, \"stimuli\": [{a}, {b}], \"switch_every\": 9}}"));
+    assert_eq!(
+        (fresh.len(), &fresh[..10], &fresh[10..]),
+        (19, &first[..], &second[1..])
+    );
+    let continuous = run(&format!(
+        "{{{body}, \"stimuli\": [{a}, {b}], \"switch_every\": 9}}"
+    ));
     assert_eq!(continuous[..10], first[..]);
     assert_ne!(continuous[10..], fresh[10..]);
-    let moved = run(&format!("{{{body}, \"stimulus\": {a}, \"control_steps\": 9, \"start_column\": 499}}"));
+    let moved = run(&format!(
+        "{{{body}, \"stimulus\": {a}, \"control_steps\": 9, \"start_column\": 499}}"
+    ));
     assert!(
         (moved[9][0] - first[9][0] - 0.6).abs() < 1e-9,
         "start_column is a voxel's tenth of a world unit"
@@ -150,26 +206,55 @@ fn a_wrong_scenario_is_refused_with_file_line_and_key() {
         ("{\"body\": [[3]], \"stimulus\": [[null]]}", "stimulus"),
         ("{\"body\": [[3]], \"stimulus\": [[1, 1]]}", "stimulus"),
         ("{\"body\": [[3]], \"stimuli\": []}", "stimuli"),
-        ("{\"body\": [[3]], \"stimuli\": [[[1]]], \"switch_every\": 0}", "switch_every"),
-        ("{\"body\": [[3]], \"stimuli\": [[[1]]], \"stimulus\": [[1]], \"switch_every\": 1}", "stimuli"),
+        (
+            "{\"body\": [[3]], \"stimuli\": [[[1]]], \"switch_every\": 0}",
+            "switch_every",
+        ),
+        (
+            "{\"body\": [[3]], \"stimuli\": [[[1]]], \"stimulus\": [[1]], \"switch_every\": 1}",
+            "stimuli",
+        ),
         ("{\"body\": [[3]], \"switch_every\": 3}", "switch_every"),
-        ("{\"body\": [[3]], \"reset_between\": true}", "reset_between"),
-        ("{\"body\": [[3]], \"physics\": {\"servo_gain\": 0}}", "servo_gain"),
+        (
+            "{\"body\": [[3]], \"reset_between\": true}",
+            "reset_between",
+        ),
+        (
+            "{\"body\": [[3]], \"physics\": {\"servo_gain\": 0}}",
+            "servo_gain",
+        ),
         ("{\"body\": [[3]], \"control_steps\": -3}", "control_steps"),
         ("{\"body\": [[3]], \"control_steps\": 1e3}", "control_steps"),
-        ("{\"body\": [[3]], \"start_column\": 9223372036854775807}", "start_column"),
-        ("{\"body\": [[3]], \"start_column\": -9223372036854775808}", "start_column"),
+        (
+            "{\"body\": [[3]], \"start_column\": 9223372036854775807}",
+            "start_column",
+        ),
+        (
+            "{\"body\": [[3]], \"start_column\": -9223372036854775808}",
+            "start_column",
+        ),
         ("{\"body\": [[3]], \"start_row\": 1}", "start_row"),
         ("{\"body\": [[3]], \"start_row\": -1}", "start_row"),
-        ("{\"body\": [[3]], \"physics\": {\"gravity\": \"x\"}}", "physics.gravity"),
-        ("{\"body\": [[3]], \"physics\": {\"mass\": 0}}", "physics.mass"),
-        ("{\"body\": [[3]], \"physics\": {\"peg_spacing\": 0}}", "physics.peg_spacing"),
+        (
+            "{\"body\": [[3]], \"physics\": {\"gravity\": \"x\"}}",
+            "physics.gravity",
+        ),
+        (
+            "{\"body\": [[3]], \"physics\": {\"mass\": 0}}",
+            "physics.mass",
+        ),
+        (
+            "{\"body\": [[3]], \"physics\": {\"peg_spacing\": 0}}",
+            "physics.peg_spacing",
+        ),
     ] {
         sandbox.write("s.json", text);
         let said = sandbox.run("simulate s.json").ended(3, &["s.json", word]);
         assert!(said.out.is_empty(), "{text}");
     }
-    sandbox.run("simulate nowhere.json").ended(3, &["nowhere.json"]);
+    sandbox
+        .run("simulate nowhere.json")
+        .ended(3, &["nowhere.json"]);
     let huge = vec![vec![1; 65]; 65];
     sandbox.write("s.json", format!("{{\"body\": {huge:?}}}"));
     sandbox.run("simulate s.json").ended(3, &["65", "64"]);

@@ -13,22 +13,50 @@ fn folder() -> PathBuf {
 }
 
 /// Units before which a number depends on the machine.
-const UNITS: [&str; 9] = ["s", "ms", "min", "h", "s,", "evaluations/s", "rollouts/s", "rollouts/s,", "s;"];
+const UNITS: [&str; 9] = [
+    "s",
+    "ms",
+    "min",
+    "h",
+    "s,",
+    "evaluations/s",
+    "rollouts/s",
+    "rollouts/s,",
+    "s;",
+];
 
 /// A text without what depends on the machine or the version: paths, durations, speeds, checksums.
 fn masked(text: &str, sandbox: &Sandbox) -> String {
-    let text = text.replace(&sandbox.path("").display().to_string(), "FOLDER/").replace(PROGRAM, "morphcog");
+    let text = text
+        .replace(&sandbox.path("").display().to_string(), "FOLDER/")
+        .replace(PROGRAM, "morphcog");
     let line = |line: &str| {
         let words: Vec<&str> = line.split(' ').collect();
         let mask = |(number, word): (usize, &&str)| {
-            let is_number = word.trim_start_matches('(').replace(',', "").parse::<f64>().is_ok();
-            let before_unit = words.get(number + 1).is_some_and(|unit| UNITS.contains(unit));
+            let is_number = word
+                .trim_start_matches('(')
+                .replace(',', "")
+                .parse::<f64>()
+                .is_ok();
+            let before_unit = words
+                .get(number + 1)
+                .is_some_and(|unit| UNITS.contains(unit));
             // The beginning of the SHA-256 of what the program wrote, its version with it.
             let begun = word.trim_end_matches([',', ')', ';']).strip_suffix('…');
-            let is_sum = begun.is_some_and(|sum| sum.len() == 10 && u64::from_str_radix(sum, 16).is_ok());
-            if is_number && before_unit || is_sum { "#".to_string() } else { (*word).to_string() }
+            let is_sum =
+                begun.is_some_and(|sum| sum.len() == 10 && u64::from_str_radix(sum, 16).is_ok());
+            if is_number && before_unit || is_sum {
+                "#".to_string()
+            } else {
+                (*word).to_string()
+            }
         };
-        words.iter().enumerate().map(mask).collect::<Vec<_>>().join(" ")
+        words
+            .iter()
+            .enumerate()
+            .map(mask)
+            .collect::<Vec<_>>()
+            .join(" ")
     };
     text.lines().map(line).collect::<Vec<_>>().join("\n")
 }
@@ -60,26 +88,43 @@ fn difference(name: &str, found: &str) -> Option<String> {
             break pair;
         }
     };
-    Some(format!("{name}: was {:?}\n{name}: is  {:?}", first.0, first.1))
+    Some(format!(
+        "{name}: was {:?}\n{name}: is  {:?}",
+        first.0, first.1
+    ))
 }
 
 /// Checks texts, each with its snapshot's name.
 #[track_caller]
 fn compare(texts: &[(&str, String)]) {
-    let differences: Vec<String> = texts.iter().filter_map(|(name, text)| difference(name, text)).collect();
-    assert!(differences.is_empty(), "UPDATE_SNAPSHOTS=1 takes them over:\n{}", differences.join("\n"));
+    let differences: Vec<String> = texts
+        .iter()
+        .filter_map(|(name, text)| difference(name, text))
+        .collect();
+    assert!(
+        differences.is_empty(),
+        "UPDATE_SNAPSHOTS=1 takes them over:\n{}",
+        differences.join("\n")
+    );
 }
 
 /// Checks these commands, each with its snapshot's name.
 #[track_caller]
 fn check_all(sandbox: &Sandbox, commands: &[(&str, &str)]) {
-    let texts: Vec<_> = commands.iter().map(|(name, args)| (*name, told(sandbox, args))).collect();
+    let texts: Vec<_> = commands
+        .iter()
+        .map(|(name, args)| (*name, told(sandbox, args)))
+        .collect();
     compare(&texts);
 }
 
 /// What these commands say, one after the other.
 fn all_told(sandbox: &Sandbox, commands: &[&str]) -> String {
-    commands.iter().map(|args| told(sandbox, args)).collect::<Vec<_>>().join("\n")
+    commands
+        .iter()
+        .map(|args| told(sandbox, args))
+        .collect::<Vec<_>>()
+        .join("\n")
 }
 
 #[test]
@@ -116,14 +161,29 @@ fn results_read_as_they_were_reviewed() {
         &sandbox,
         &[
             ("evolve", "evolve -q -c tiny.toml -o again --threads 1"),
-            ("eval", "eval -q -a run --images 20 --cycles 1 --robots top:3 --threads 1"),
-            ("audit", "audit -q -a run --robots top:1 --threads 1 --set perturbations.time_step=[2]"),
+            (
+                "eval",
+                "eval -q -a run --images 20 --cycles 1 --robots top:3 --threads 1",
+            ),
+            (
+                "audit",
+                "audit -q -a run --robots top:1 --threads 1 --set perturbations.time_step=[2]",
+            ),
             ("gallery", "gallery"),
             ("data-info", "data info builtin"),
-            ("sweep-list", "sweep plan.toml --out sweep --list --threads 1"),
+            (
+                "sweep-list",
+                "sweep plan.toml --out sweep --list --threads 1",
+            ),
             ("sweep-status", "sweep plan.toml --out sweep --status"),
-            ("sweep-slurm", "sweep plan.toml --out sweep --slurm --threads 1"),
-            ("team", "team -q -a run --classes 0,1 --images 20 --threads 1"),
+            (
+                "sweep-slurm",
+                "sweep plan.toml --out sweep --slurm --threads 1",
+            ),
+            (
+                "team",
+                "team -q -a run --classes 0,1 --images 20 --threads 1",
+            ),
             ("robots", "replay -a run --robot nobody"),
             ("plot", "plot -q archive -a run"),
             ("report", "report -q run"),
@@ -154,7 +214,10 @@ fn errors_say_what_where_and_what_to_do_as_they_were_reviewed() {
             ("error-no-run", "eval -a nowhere"),
             ("error-cut-run", "eval -a cut/run.json"),
             ("error-no-robot", "eval -a run --robots nobody"),
-            ("error-no-data", "evolve -q -c tiny.toml --set data.dataset=mnist -o mnist"),
+            (
+                "error-no-data",
+                "evolve -q -c tiny.toml --set data.dataset=mnist -o mnist",
+            ),
             ("error-task", "train -q -a run --task 1|1 -o task"),
             ("error-plan", "sweep nowhere.toml"),
         ],
@@ -168,8 +231,16 @@ fn errors_about_configs_read_as_they_were_reviewed() {
         assert!(TINY.contains(from), "{from}");
         sandbox.write(name, TINY.replace(from, to));
     };
-    changed("typed.toml", "[protocol]", "[physics]\ngravity = \"much\"\n[protocol]");
-    changed("nested.toml", "[protocol]", "[physics]\ngravitee = 3\n[protocol]");
+    changed(
+        "typed.toml",
+        "[protocol]",
+        "[physics]\ngravity = \"much\"\n[protocol]",
+    );
+    changed(
+        "nested.toml",
+        "[protocol]",
+        "[physics]\ngravitee = 3\n[protocol]",
+    );
     changed("twice.toml", "seed = 3", "seed = 3\nseed = 4");
     changed("three.toml", "[[0], [1]]", "[[0], [1], [2]]");
     changed("same.toml", "[[0], [1]]", "[[0], [0]]");
@@ -177,11 +248,23 @@ fn errors_about_configs_read_as_they_were_reviewed() {
     changed("class.toml", "[0, 1]", "[0]");
     sandbox.write("half.toml", [0xff, 0xfe, b'a']);
     let table: toml::Table = toml::from_str(TINY).unwrap();
-    sandbox.write("two.json", format!("{} {{}}", serde_json::to_string(&table).unwrap()));
-    let files =
-        ["typed.toml", "nested.toml", "twice.toml", "three.toml", "same.toml", "image.toml", "class.toml"];
-    let of_files =
-        files.into_iter().chain(["half.toml", "two.json"]).map(|name| format!("evolve -c {name} -o new"));
+    sandbox.write(
+        "two.json",
+        format!("{} {{}}", serde_json::to_string(&table).unwrap()),
+    );
+    let files = [
+        "typed.toml",
+        "nested.toml",
+        "twice.toml",
+        "three.toml",
+        "same.toml",
+        "image.toml",
+        "class.toml",
+    ];
+    let of_files = files
+        .into_iter()
+        .chain(["half.toml", "two.json"])
+        .map(|name| format!("evolve -c {name} -o new"));
     let sets = [
         "seed",
         "task.groups.3.1=1",
@@ -201,13 +284,18 @@ fn errors_about_configs_read_as_they_were_reviewed() {
 #[test]
 fn errors_of_single_commands_read_as_they_were_reviewed() {
     let sandbox = with_run();
-    sandbox.run("eval -q -a run --images 20 --cycles 1 --robots top:3").ended(0, &[]);
+    sandbox
+        .run("eval -q -a run --images 20 --cycles 1 --robots top:3")
+        .ended(0, &[]);
     sandbox.write("plan.toml", "config = \"tiny.toml\"\nseeds = [1, 2]\n");
     sandbox.write("absent.toml", "config = \"own.toml\"\n");
     sandbox.write("block.json", "{\"body\": [[1]], \"control_steps\": 1}");
     let all = |start: &str, ends: &[&str]| {
         let commands: Vec<String> = ends.iter().map(|end| format!("{start} {end}")).collect();
-        all_told(&sandbox, &commands.iter().map(String::as_str).collect::<Vec<_>>())
+        all_told(
+            &sandbox,
+            &commands.iter().map(String::as_str).collect::<Vec<_>>(),
+        )
     };
     let capacity = [
         "--set sizes=[1,4,9]",
@@ -295,9 +383,16 @@ fn errors_of_single_commands_read_as_they_were_reviewed() {
         "report block.json",
         "simulate block.json -o block.json",
     ];
-    let audit = ["-o run/eval.json", "--set perturbations.time_step=[1]", "--set perturbations.start.9=1"];
+    let audit = [
+        "-o run/eval.json",
+        "--set perturbations.time_step=[1]",
+        "--set perturbations.start.9=1",
+    ];
     compare(&[
-        ("errors-capacity", all("capacity --eval run/eval.json", &capacity)),
+        (
+            "errors-capacity",
+            all("capacity --eval run/eval.json", &capacity),
+        ),
         ("errors-eval", all("eval -a run", &eval)),
         ("errors-train", all("train -q -a run", &train)),
         ("errors-response", all("response -q -a run", &response)),
@@ -333,7 +428,12 @@ fn what_no_longer_belongs_to_a_run_is_said_as_it_was_reviewed() {
     text += "\n";
     text += &all_told(
         &sandbox,
-        &["eval -a run", "audit -a run", "replay -a run --format png", "report -a run --rollouts 0"],
+        &[
+            "eval -a run",
+            "audit -a run",
+            "replay -a run --format png",
+            "report -a run --rollouts 0",
+        ],
     );
     compare(&[("stale", text)]);
 }
@@ -342,8 +442,10 @@ fn what_no_longer_belongs_to_a_run_is_said_as_it_was_reviewed() {
 fn what_stands_in_the_way_of_going_on_is_said_as_it_was_reviewed() {
     let sandbox = with_run();
     let resume = "evolve -q -c tiny.toml -o run --threads 1 --resume -g";
-    let mut texts =
-        vec![told(&sandbox, &format!("{resume} 5")), told(&sandbox, &format!("{resume} 13 --set seed=4"))];
+    let mut texts = vec![
+        told(&sandbox, &format!("{resume} 5")),
+        told(&sandbox, &format!("{resume} 13 --set seed=4")),
+    ];
     sandbox.write("run/checkpoint.json", "{");
     texts.push(told(&sandbox, &format!("{resume} 13")));
     for name in ["checkpoint.json", "checkpoint.previous.json"] {
@@ -361,10 +463,17 @@ fn what_stands_in_the_way_of_going_on_is_said_as_it_was_reviewed() {
 fn what_other_images_and_gaits_are_not_for_is_said_as_it_was_reviewed() {
     let sandbox = Sandbox::tiny();
     write_images(&sandbox, "there/emnist-letters-", [6, 9], 1);
-    let letters =
-        all_told(&sandbox, &["data info letters --data there", "data sheet letters --data there -o a.png"]);
+    let letters = all_told(
+        &sandbox,
+        &[
+            "data info letters --data there",
+            "data sheet letters --data there -o a.png",
+        ],
+    );
     sandbox.write("gaits.toml", gaits());
-    sandbox.run("evolve -q -c gaits.toml -g 2 -o gaits").ended(0, &[]);
+    sandbox
+        .run("evolve -q -c gaits.toml -g 2 -o gaits")
+        .ended(0, &[]);
     let gaits = all_told(
         &sandbox,
         &[

@@ -24,8 +24,12 @@ robots = "top:2"
 images = 4
 "#;
 
-const TASKS: [&str; 4] =
-    ["tiny-parents=4-seed1", "tiny-parents=4-seed2", "tiny-parents=8-seed1", "tiny-parents=8-seed2"];
+const TASKS: [&str; 4] = [
+    "tiny-parents=4-seed1",
+    "tiny-parents=4-seed2",
+    "tiny-parents=8-seed1",
+    "tiny-parents=8-seed2",
+];
 
 fn sandbox() -> Sandbox {
     let sandbox = Sandbox::tiny();
@@ -39,7 +43,9 @@ fn swept() -> Sandbox {
     Sandbox::once(&SWEPT, |sandbox| {
         sandbox.write("tiny.toml", TINY);
         sandbox.write("plan.toml", PLAN);
-        sandbox.run("sweep plan.toml --out all --jobs 2 --threads 2").ended(0, &["task 4", "4 of 4"]);
+        sandbox
+            .run("sweep plan.toml --out all --jobs 2 --threads 2")
+            .ended(0, &["task 4", "4 of 4"]);
     })
 }
 
@@ -58,8 +64,13 @@ fn results(sandbox: &Sandbox, out: &str) -> BTreeMap<String, Vec<u8>> {
 
 /// The states of all tasks.
 fn states(sandbox: &Sandbox, out: &str) -> Vec<String> {
-    let said = sandbox.run(&format!("sweep plan.toml --out {out} --status --json")).ended(0, &[]);
-    said.json_lines().iter().map(|line| line["state"].as_str().unwrap().to_string()).collect()
+    let said = sandbox
+        .run(&format!("sweep plan.toml --out {out} --status --json"))
+        .ended(0, &[]);
+    said.json_lines()
+        .iter()
+        .map(|line| line["state"].as_str().unwrap().to_string())
+        .collect()
 }
 
 #[test]
@@ -76,8 +87,13 @@ fn every_combination_is_run_and_a_second_call_has_nothing_left_to_do() {
     assert!(!said.err.contains("task 1"), "{said:?}");
     assert_eq!(files(&sandbox.path("all").join(TASKS[0])), before);
     // The same as a run of one's own.
-    sandbox.run("evolve -q -c tiny.toml --seed 2 --set map_elites.parents=4 -o own").ended(0, &[]);
-    assert_eq!(sandbox.read("own/run.json").as_bytes(), all["tiny-parents=4-seed2/run.json"]);
+    sandbox
+        .run("evolve -q -c tiny.toml --seed 2 --set map_elites.parents=4 -o own")
+        .ended(0, &[]);
+    assert_eq!(
+        sandbox.read("own/run.json").as_bytes(),
+        all["tiny-parents=4-seed2/run.json"]
+    );
 }
 
 #[test]
@@ -85,8 +101,14 @@ fn tasks_done_one_by_one_or_killed_at_any_moment_make_the_same_bytes() {
     let sandbox = swept();
     let all = results(&sandbox, "all");
     // By number, and by the numbers of engines.
-    sandbox.run("sweep plan.toml --out alone --task 2 --threads 1").ended(0, &[]);
-    for (name, number) in [("SLURM_ARRAY_TASK_ID", "1"), ("HQ_TASK_ID", "3"), ("PBS_ARRAY_INDEX", "4")] {
+    sandbox
+        .run("sweep plan.toml --out alone --task 2 --threads 1")
+        .ended(0, &[]);
+    for (name, number) in [
+        ("SLURM_ARRAY_TASK_ID", "1"),
+        ("HQ_TASK_ID", "3"),
+        ("PBS_ARRAY_INDEX", "4"),
+    ] {
         let mut command = sandbox.command("sweep plan.toml --out alone --task".split(' '));
         command.env(name, number);
         let ended = said(command).ended(0, &[]);
@@ -109,7 +131,10 @@ fn tasks_done_one_by_one_or_killed_at_any_moment_make_the_same_bytes() {
 #[test]
 fn listed_commands_do_the_tasks_from_any_folder() {
     let sandbox = swept();
-    let list = sandbox.run("sweep plan.toml --out elsewhere --list").ended(0, &[]).out;
+    let list = sandbox
+        .run("sweep plan.toml --out elsewhere --list")
+        .ended(0, &[])
+        .out;
     assert_eq!(list.lines().count(), 4);
     let away = tempfile::tempdir().unwrap();
     for line in list.lines() {
@@ -124,16 +149,30 @@ fn listed_commands_do_the_tasks_from_any_folder() {
     }
     assert_eq!(results(&sandbox, "elsewhere"), results(&sandbox, "all"));
     assert_eq!(std::fs::read_dir(away.path()).unwrap().count(), 0);
-    let script = sandbox.run("sweep plan.toml --out elsewhere --slurm").ended(0, &[]).out;
-    assert!(script.starts_with("#!/bin/bash\n") && script.contains("#SBATCH --array=1-4\n"), "{script}");
-    assert!(script.contains("--requeue") && script.contains("--task \"$number\" &"), "{script}");
+    let script = sandbox
+        .run("sweep plan.toml --out elsewhere --slurm")
+        .ended(0, &[])
+        .out;
+    assert!(
+        script.starts_with("#!/bin/bash\n") && script.contains("#SBATCH --array=1-4\n"),
+        "{script}"
+    );
+    assert!(
+        script.contains("--requeue") && script.contains("--task \"$number\" &"),
+        "{script}"
+    );
 }
 
 #[test]
 fn what_is_wrong_is_said_all_at_once_before_anything_starts() {
     let sandbox = sandbox();
-    sandbox.run("sweep plan.toml --set seeds=[1,1]").ended(3, &["--set seeds=[1,1]: seeds"]);
-    sandbox.write("bad.toml", PLAN.replace("[4, 8]", "[0, 8]\ngenerations = [0, 5]"));
+    sandbox
+        .run("sweep plan.toml --set seeds=[1,1]")
+        .ended(3, &["--set seeds=[1,1]: seeds"]);
+    sandbox.write(
+        "bad.toml",
+        PLAN.replace("[4, 8]", "[0, 8]\ngenerations = [0, 5]"),
+    );
     let said = sandbox.run("sweep bad.toml").ended(
         3,
         &[
@@ -142,15 +181,32 @@ fn what_is_wrong_is_said_all_at_once_before_anything_starts() {
         ],
     );
     assert_eq!(said.err.matches("error:").count(), 2, "{}", said.err);
-    sandbox.run("sweep plan.toml --set set=[\"seed=3\"]").ended(3, &["set: seed: "]);
+    sandbox
+        .run("sweep plan.toml --set set=[\"seed=3\"]")
+        .ended(3, &["set: seed: "]);
     let mnist = "sweep plan.toml --set set=[\"data.dataset=mnist\"]";
-    let said = sandbox.run(mnist).ended(3, &["data/mnist", "data fetch mnist"]);
-    assert_eq!(said.err.matches("error:").count() + said.err.matches("warning:").count(), 1, "{}", said.err);
+    let said = sandbox
+        .run(mnist)
+        .ended(3, &["data/mnist", "data fetch mnist"]);
+    assert_eq!(
+        said.err.matches("error:").count() + said.err.matches("warning:").count(),
+        1,
+        "{}",
+        said.err
+    );
     sandbox.write("typo.toml", PLAN.replace("seeds", "seed"));
-    sandbox.run("sweep typo.toml").ended(3, &["typo.toml:3", "seed"]);
-    sandbox.run("sweep plan.toml --task 5").ended(2, &["--task 5", "1 to 4"]);
-    sandbox.run("sweep plan.toml --task").ended(2, &["HQ_TASK_ID, SLURM_ARRAY_TASK_ID, PBS_ARRAY_INDEX"]);
-    sandbox.run("sweep plan.toml --task 1 --list").ended(2, &["--list"]);
+    sandbox
+        .run("sweep typo.toml")
+        .ended(3, &["typo.toml:3", "seed"]);
+    sandbox
+        .run("sweep plan.toml --task 5")
+        .ended(2, &["--task 5", "1 to 4"]);
+    sandbox
+        .run("sweep plan.toml --task")
+        .ended(2, &["HQ_TASK_ID, SLURM_ARRAY_TASK_ID, PBS_ARRAY_INDEX"]);
+    sandbox
+        .run("sweep plan.toml --task 1 --list")
+        .ended(2, &["--list"]);
     assert!(!sandbox.path("runs").exists());
 }
 
@@ -159,22 +215,48 @@ fn a_changed_plan_keeps_what_is_done_and_refuses_other_settings_with_their_keys(
     let sandbox = swept();
     let before = results(&sandbox, "all");
     // More seeds, and another order: names stay, numbers do not.
-    sandbox.write("plan.toml", PLAN.replace("[1, 2]", "[5, 2, 1]").replace("[4, 8]", "[8, 4]"));
-    let said = sandbox.run("sweep plan.toml --out all").ended(0, &["6 of 6"]);
-    assert!(!said.err.contains("seed1)") && said.err.contains("tiny-parents=4-seed5"), "{}", said.err);
+    sandbox.write(
+        "plan.toml",
+        PLAN.replace("[1, 2]", "[5, 2, 1]")
+            .replace("[4, 8]", "[8, 4]"),
+    );
+    let said = sandbox
+        .run("sweep plan.toml --out all")
+        .ended(0, &["6 of 6"]);
+    assert!(
+        !said.err.contains("seed1)") && said.err.contains("tiny-parents=4-seed5"),
+        "{}",
+        said.err
+    );
     assert_eq!(results(&sandbox, "all"), before);
     // More generations go on; another step is done.
-    sandbox.write("plan.toml", PLAN.replace("\nseeds", "\nset = [\"generations=20\"]\nseeds"));
+    sandbox.write(
+        "plan.toml",
+        PLAN.replace("\nseeds", "\nset = [\"generations=20\"]\nseeds"),
+    );
     assert_eq!(states(&sandbox, "all"), ["stopped"; 4]);
-    sandbox.run("sweep plan.toml --out all -q --task 1").ended(0, &[]);
-    assert_eq!(sandbox.run_file(&format!("all/{}", TASKS[0])).generations, 20);
+    sandbox
+        .run("sweep plan.toml --out all -q --task 1")
+        .ended(0, &[]);
+    assert_eq!(
+        sandbox.run_file(&format!("all/{}", TASKS[0])).generations,
+        20
+    );
     // Other bodies are other runs.
-    let other = PLAN.replace("\nseeds", "\nset = [\"body.height=4\", \"task.groups=[[0],[7]]\"]\nseeds");
+    let other = PLAN.replace(
+        "\nseeds",
+        "\nset = [\"body.height=4\", \"task.groups=[[0],[7]]\"]\nseeds",
+    );
     sandbox.write("plan.toml", other);
     let before = results(&sandbox, "all");
     let said = sandbox.run("sweep plan.toml --out all").ended(
         3,
-        &["task 1 (tiny-parents=4-seed1): ", "body.height = 5", "task.groups = [[0], [1]]", "task 4"],
+        &[
+            "task 1 (tiny-parents=4-seed1): ",
+            "body.height = 5",
+            "task.groups = [[0], [1]]",
+            "task 4",
+        ],
     );
     assert_eq!(said.err.matches("error:").count(), 4, "{}", said.err);
     assert_eq!(results(&sandbox, "all"), before);
@@ -196,13 +278,18 @@ fn a_test_of_physical_robots_is_done_again_if_others_are_physical_now() {
         }
         sandbox.write(path, audit.to_string());
     };
-    sandbox.write("plan.toml", plan.replace("images = 4", "images = 4\nphysical_only = true"));
+    sandbox.write(
+        "plan.toml",
+        plan.replace("images = 4", "images = 4\nphysical_only = true"),
+    );
     let tested = || {
         sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
         let text = sandbox.read("all/tiny-parents=4-seed1/eval.json");
         let eval: serde_json::Value = serde_json::from_str(&text).unwrap();
         let robots = eval["robots"].as_array().unwrap().iter();
-        robots.map(|robot| robot["id"].as_str().unwrap().to_string()).collect::<Vec<_>>()
+        robots
+            .map(|robot| robot["id"].as_str().unwrap().to_string())
+            .collect::<Vec<_>>()
     };
     let robots = sandbox.run_file("all/tiny-parents=4-seed1").elites;
     let ids: Vec<String> = robots.into_iter().take(4).map(|robot| robot.id).collect();
@@ -223,13 +310,23 @@ fn a_test_of_physical_robots_is_done_again_if_others_are_physical_now() {
 fn a_task_that_fails_does_not_stop_the_others_and_is_tried_again() {
     let sandbox = swept();
     let broken = sandbox.path("all").join(TASKS[1]);
-    TASKS[1..3].iter().for_each(|task| std::fs::remove_dir_all(sandbox.path("all").join(task)).unwrap());
+    TASKS[1..3]
+        .iter()
+        .for_each(|task| std::fs::remove_dir_all(sandbox.path("all").join(task)).unwrap());
     sandbox.write(&format!("all/{}/run.json", TASKS[1]), "{}");
     assert_eq!(states(&sandbox, "all")[2..], ["waiting", "done"]);
-    let said = sandbox.run("sweep plan.toml --out all").ended(1, &["task 2"]);
-    assert!(!said.err.contains("--force"), "hints are those of a sweep: {}", said.err);
+    let said = sandbox
+        .run("sweep plan.toml --out all")
+        .ended(1, &["task 2"]);
+    assert!(
+        !said.err.contains("--force"),
+        "hints are those of a sweep: {}",
+        said.err
+    );
     assert_eq!(states(&sandbox, "all"), ["done", "failed", "done", "done"]);
-    sandbox.run("sweep plan.toml --out all --task 2").ended(3, &[]);
+    sandbox
+        .run("sweep plan.toml --out all --task 2")
+        .ended(3, &[]);
     std::fs::remove_file(broken.join("run.json")).unwrap();
     sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
     assert_eq!(states(&sandbox, "all"), ["done"; 4]);
@@ -239,7 +336,11 @@ fn a_task_that_fails_does_not_stop_the_others_and_is_tried_again() {
 fn wait_for(path: &Path) {
     let begin = Instant::now();
     while !path.exists() {
-        assert!(begin.elapsed() < Duration::from_secs(60), "{}", path.display());
+        assert!(
+            begin.elapsed() < Duration::from_secs(60),
+            "{}",
+            path.display()
+        );
         std::thread::sleep(Duration::from_millis(5));
     }
 }
@@ -247,15 +348,24 @@ fn wait_for(path: &Path) {
 #[test]
 fn a_task_is_one_process_s_and_a_stopped_one_says_so() {
     let sandbox = sandbox();
-    sandbox.write("plan.toml", PLAN.replace("\nseeds", "\nset = [\"generations=1000000\"]\nseeds"));
+    sandbox.write(
+        "plan.toml",
+        PLAN.replace("\nseeds", "\nset = [\"generations=1000000\"]\nseeds"),
+    );
     let task = |number: u32| format!("sweep plan.toml --out all --task {number}");
     let mut first = sandbox.start(&task(1));
     wait_for(&sandbox.path("all").join(TASKS[0]).join("task.json"));
     sandbox.run(&task(1)).ended(5, &[&first.id().to_string()]);
-    assert_eq!(states(&sandbox, "all"), ["running", "waiting", "waiting", "waiting"]);
+    assert_eq!(
+        states(&sandbox, "all"),
+        ["running", "waiting", "waiting", "waiting"]
+    );
     first.kill().unwrap();
     first.wait().unwrap();
-    assert_eq!(states(&sandbox, "all"), ["stopped", "waiting", "waiting", "waiting"]);
+    assert_eq!(
+        states(&sandbox, "all"),
+        ["stopped", "waiting", "waiting", "waiting"]
+    );
     for number in [1, 2] {
         let mut child = sandbox.start(&task(number));
         let until = Instant::now() + Duration::from_secs(60);
@@ -266,7 +376,10 @@ fn a_task_is_one_process_s_and_a_stopped_one_says_so() {
         let ended = child.wait().unwrap();
         assert_eq!(ended.code(), Some(75));
     }
-    assert_eq!(states(&sandbox, "all"), ["stopped", "stopped", "waiting", "waiting"]);
+    assert_eq!(
+        states(&sandbox, "all"),
+        ["stopped", "stopped", "waiting", "waiting"]
+    );
     // All of them at once, too.
     let mut child = sandbox.start("sweep plan.toml --out all");
     std::thread::sleep(Duration::from_millis(300));
@@ -277,11 +390,15 @@ fn a_task_is_one_process_s_and_a_stopped_one_says_so() {
 #[test]
 fn a_task_whose_lock_is_lost_ends_with_an_error_and_leaves_the_folder_alone() {
     let sandbox = sandbox();
-    sandbox.write("plan.toml", PLAN.replace("\nseeds", "\nset = [\"generations=1000000\"]\nseeds"));
+    sandbox.write(
+        "plan.toml",
+        PLAN.replace("\nseeds", "\nset = [\"generations=1000000\"]\nseeds"),
+    );
     let folder = sandbox.path("all").join(TASKS[0]);
-    for (command, code) in
-        [("sweep plan.toml --out all --task 1", 5), ("sweep plan.toml --out all -q --jobs 1", 1)]
-    {
+    for (command, code) in [
+        ("sweep plan.toml --out all --task 1", 5),
+        ("sweep plan.toml --out all -q --jobs 1", 1),
+    ] {
         let mut child = sandbox.start(command);
         wait_for(&folder.join("run.json"));
         std::fs::remove_file(folder.join(".task.lock")).unwrap();
@@ -295,7 +412,12 @@ fn a_task_whose_lock_is_lost_ends_with_an_error_and_leaves_the_folder_alone() {
         }
         let before = files(&folder);
         let mut said = String::new();
-        child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+        child
+            .stderr
+            .take()
+            .unwrap()
+            .read_to_string(&mut said)
+            .unwrap();
         assert_eq!(child.wait().unwrap().code(), Some(code), "{said}");
         assert_eq!(said.matches("not written").count(), 1, "{said}");
         assert_eq!(files(&folder)["task.json"], before["task.json"]);
@@ -310,25 +432,37 @@ fn what_was_found_is_collected_in_one_table_and_figures() {
     files(&part).iter().for_each(|(name, content)| {
         sandbox.write(&format!("part/{}/{name}", TASKS[0]), content);
     });
-    let said = sandbox.run("sweep plan.toml --out part --collect").ended(0, &["3 waiting"]);
+    let said = sandbox
+        .run("sweep plan.toml --out part --collect")
+        .ended(0, &["3 waiting"]);
     assert!(said.out.contains("sweep.csv"), "{said:?}");
-    let said = sandbox.run("sweep plan.toml --out all --collect").ended(0, &[]);
+    let said = sandbox
+        .run("sweep plan.toml --out all --collect")
+        .ended(0, &[]);
     assert!(!said.err.contains("warning"), "{}", said.err);
     let table = sandbox.read("all/sweep.csv");
     let mut reader = csv::Reader::from_reader(table.as_bytes());
-    let rows: Vec<BTreeMap<String, String>> = reader.deserialize().collect::<Result<_, _>>().unwrap();
+    let rows: Vec<BTreeMap<String, String>> =
+        reader.deserialize().collect::<Result<_, _>>().unwrap();
     assert_eq!(rows.len(), 4);
     for (row, task) in rows.iter().zip(TASKS) {
         let eval: serde_json::Value =
             serde_json::from_str(&sandbox.read(&format!("all/{task}/eval.json"))).unwrap();
         assert_eq!(
-            (row["name"].as_str(), row["state"].as_str(), row["recognises"].as_str()),
+            (
+                row["name"].as_str(),
+                row["state"].as_str(),
+                row["recognises"].as_str()
+            ),
             (task, "done", "0|1")
         );
         let accuracy: f64 = row["accuracy"].parse().unwrap();
         assert_eq!(accuracy, eval["means"]["0|1"]["accuracy"].as_f64().unwrap());
         let run = sandbox.run_file(&format!("all/{task}"));
-        assert_eq!(row["varied_map_elites.parents"], run.config.map_elites.parents.to_string());
+        assert_eq!(
+            row["varied_map_elites.parents"],
+            run.config.map_elites.parents.to_string()
+        );
         assert_eq!(row["varied_seed"], run.config.seed.to_string());
         assert_eq!(row["num_elites"], run.elites.len().to_string());
         assert_eq!(row["audited"], run.elites.len().to_string());
@@ -336,7 +470,10 @@ fn what_was_found_is_collected_in_one_table_and_figures() {
     // Two settings are two lines, each of two seeds.
     for figure in ["sweep-accuracy.svg", "sweep-progress.svg"] {
         let text = sandbox.read(&format!("all/{figure}"));
-        assert!(text.contains("parents=4") && text.contains("parents=8"), "{figure}");
+        assert!(
+            text.contains("parents=4") && text.contains("parents=8"),
+            "{figure}"
+        );
     }
     assert!(sandbox.read("all/sweep-progress.svg").contains("2 seeds"));
     // What is of another state of a run is left out, and the rest is there.
@@ -344,12 +481,16 @@ fn what_was_found_is_collected_in_one_table_and_figures() {
     sandbox
         .run("evolve -q -c all/tiny-parents=4-seed1/config.toml -o all/tiny-parents=4-seed1 --resume -g 30");
     assert_ne!(sandbox.read("all/tiny-parents=4-seed1/run.json"), before);
-    sandbox.run("sweep plan.toml --out all --collect").ended(0, &["seed1/audit.json", "seed1/eval.json"]);
+    sandbox
+        .run("sweep plan.toml --out all --collect")
+        .ended(0, &["seed1/audit.json", "seed1/eval.json"]);
     let table = sandbox.read("all/sweep.csv");
     assert_eq!(table.lines().count(), 5);
     // So they are in plot.
     let archives = TASKS.map(|task| format!("all/{task}")).join(" ");
-    let said = sandbox.run(&format!("plot progress -a {archives} -o together.svg")).ended(0, &[]);
+    let said = sandbox
+        .run(&format!("plot progress -a {archives} -o together.svg"))
+        .ended(0, &[]);
     assert!(said.out.contains("map_elites.parents"), "{}", said.out);
     assert!(sandbox.read("together.svg").contains("parents=4 (2 seeds)"));
 }
@@ -358,7 +499,9 @@ fn what_was_found_is_collected_in_one_table_and_figures() {
 fn trainings_are_swept_over_pairs_of_classes() {
     let sandbox = Sandbox::new();
     sandbox.write("run.toml", TINY);
-    sandbox.run("evolve -q -c run.toml -o gaits/walkers").ended(0, &[]);
+    sandbox
+        .run("evolve -q -c run.toml -o gaits/walkers")
+        .ended(0, &[]);
     let plan = r#"
 archive = "../gaits/walkers"
 robots = "top:2"
@@ -373,27 +516,54 @@ images = 4
 split = "validation"
 "#;
     sandbox.write("plans/pairs.toml", plan);
-    sandbox.write("plans/validated.toml", plan.replace("validation.best=0", "validation.best=1"));
-    sandbox.run("sweep plans/pairs.toml --out pairs").ended(0, &["3 of 3"]);
-    for (task, name) in
-        [("1|3", "walkers-1v3-seed3"), ("3|4", "walkers-3v4-seed3"), ("1|4", "walkers-1v4-seed3")]
-    {
+    sandbox.write(
+        "plans/validated.toml",
+        plan.replace("validation.best=0", "validation.best=1"),
+    );
+    sandbox
+        .run("sweep plans/pairs.toml --out pairs")
+        .ended(0, &["3 of 3"]);
+    for (task, name) in [
+        ("1|3", "walkers-1v3-seed3"),
+        ("3|4", "walkers-3v4-seed3"),
+        ("1|4", "walkers-1v4-seed3"),
+    ] {
         let run = sandbox.run_file(&format!("pairs/{name}"));
         assert_eq!(run.elites[0].task, task);
         for file in ["audit.json", "eval-validation.json"] {
-            assert!(sandbox.path(&format!("pairs/{name}/{file}")).exists(), "{name}/{file}");
+            assert!(
+                sandbox.path(&format!("pairs/{name}/{file}")).exists(),
+                "{name}/{file}"
+            );
         }
-        assert!(!sandbox.path(&format!("pairs/{name}/validation.json")).exists());
+        assert!(
+            !sandbox
+                .path(&format!("pairs/{name}/validation.json"))
+                .exists()
+        );
     }
-    let said = sandbox.run("sweep plans/pairs.toml --out pairs --collect").ended(0, &[]);
-    assert!(said.out.contains("1|3") && said.out.contains("validation"), "{}", said.out);
+    let said = sandbox
+        .run("sweep plans/pairs.toml --out pairs --collect")
+        .ended(0, &[]);
+    assert!(
+        said.out.contains("1|3") && said.out.contains("validation"),
+        "{}",
+        said.out
+    );
     // The robot that a training made is shown other images where the plan says so.
-    sandbox.run("sweep plans/validated.toml --out validated --task 1").ended(0, &[]);
-    assert!(sandbox.path("validated/walkers-1v3-seed3/validation.json").exists());
+    sandbox
+        .run("sweep plans/validated.toml --out validated --task 1")
+        .ended(0, &[]);
+    assert!(
+        sandbox
+            .path("validated/walkers-1v3-seed3/validation.json")
+            .exists()
+    );
     // One that is stopped says so, and goes on.
     let one = "sweep plans/pairs.toml --out one --task 1";
-    let mut child =
-        sandbox.start(&format!("{one} --set set=[\"train.random_images=20\",\"train.challengers=1000000\"]"));
+    let mut child = sandbox.start(&format!(
+        "{one} --set set=[\"train.random_images=20\",\"train.challengers=1000000\"]"
+    ));
     wait_for(&sandbox.path("one/walkers-1v3-seed3/training.json"));
     crate::common::program::terminate(&child);
     assert_eq!(child.wait().unwrap().code(), Some(75));
@@ -414,14 +584,23 @@ fn the_runs_of_a_reproduction_are_tasks_of_the_same_kind() {
     sandbox.write("paper.toml", plan);
     let reproduce = |more: &str| sandbox.run(&format!("reproduce paper.toml --scale 0.5 {more}"));
     let list = reproduce("--out one --list").ended(0, &[]).out;
-    assert!(list.lines().count() == 2 && list.contains("--scale 0.5"), "{list}");
+    assert!(
+        list.lines().count() == 2 && list.contains("--scale 0.5"),
+        "{list}"
+    );
     reproduce("--out one --task 2").ended(0, &[]);
-    assert!(sandbox.path("one/tiny-seed2/run.json").exists() && !sandbox.path("one/tiny-seed1").exists());
+    assert!(
+        sandbox.path("one/tiny-seed2/run.json").exists()
+            && !sandbox.path("one/tiny-seed1").exists()
+    );
     let status = reproduce("--out one --status").ended(0, &[]).out;
     assert!(status.contains("2 tasks: 1 done, 1 waiting"), "{status}");
     reproduce("--out one").ended(0, &[]);
     reproduce("--out two").ended(0, &[]);
-    assert_eq!(sandbox.read("one/reproduction.csv"), sandbox.read("two/reproduction.csv"));
+    assert_eq!(
+        sandbox.read("one/reproduction.csv"),
+        sandbox.read("two/reproduction.csv")
+    );
 }
 
 /// A short plan with two tasks.
@@ -436,15 +615,25 @@ fn runs_of_another_plan_are_no_results_of_this_one() {
     sandbox
         .run("evolve -q -c tiny.toml -g 2 --seed 2 --set protocol.control_steps=5 -o all/tiny-seed2 --force")
         .ended(0, &[]);
-    sandbox.run("sweep plan.toml --out all --collect").ended(0, &["protocol.control_steps = 5"]);
+    sandbox
+        .run("sweep plan.toml --out all --collect")
+        .ended(0, &["protocol.control_steps = 5"]);
     let csv = sandbox.read("all/sweep.csv");
     let lines: Vec<&str> = csv.lines().collect();
-    assert!(lines[1].contains("0|1") && !lines[2].contains("0|1"), "{csv}");
+    assert!(
+        lines[1].contains("0|1") && !lines[2].contains("0|1"),
+        "{csv}"
+    );
     // The plan was changed in a key that is in no folder's name.
-    sandbox.write("plan.toml", SHORT.replace("generations=2", "protocol.control_steps=5"));
+    sandbox.write(
+        "plan.toml",
+        SHORT.replace("generations=2", "protocol.control_steps=5"),
+    );
     for what in ["--collect", "--status", ""] {
         let words = ["task 1 (tiny-seed1)", "protocol.control_steps = 20"];
-        sandbox.run(&format!("sweep plan.toml --out all {what}")).ended(3, &words);
+        sandbox
+            .run(&format!("sweep plan.toml --out all {what}"))
+            .ended(3, &words);
     }
 }
 
@@ -452,7 +641,10 @@ fn runs_of_another_plan_are_no_results_of_this_one() {
 fn what_a_later_step_lacks_is_said_before_the_first_task_begins() {
     let sandbox = Sandbox::tiny();
     for (more, words) in [
-        ("[eval]\nimages = 100000", &["task 1 (tiny-seed1)", "eval.images = 100000", "class 0"][..]),
+        (
+            "[eval]\nimages = 100000",
+            &["task 1 (tiny-seed1)", "eval.images = 100000", "class 0"][..],
+        ),
         ("[eval]\nimages = 1", &["eval.images = 1"]),
         ("[validation]", &["validation"]),
         (
@@ -462,17 +654,26 @@ fn what_a_later_step_lacks_is_said_before_the_first_task_begins() {
         ("groups = [\"0|1\", \"1|0\"]", &["groups"]),
     ] {
         let (first, rest) = more.split_once('\n').unwrap_or((more, ""));
-        let keys =
-            if first.starts_with('[') { format!("{SHORT}{more}") } else { format!("{first}\n{SHORT}{rest}") };
+        let keys = if first.starts_with('[') {
+            format!("{SHORT}{more}")
+        } else {
+            format!("{first}\n{SHORT}{rest}")
+        };
         sandbox.write("plan.toml", keys);
         for task in ["", "--task 1"] {
-            sandbox.run(&format!("sweep plan.toml --out all {task}")).ended(3, words);
+            sandbox
+                .run(&format!("sweep plan.toml --out all {task}"))
+                .ended(3, words);
         }
         assert!(!sandbox.path("all/tiny-seed1/run.json").exists(), "{more}");
     }
     sandbox.write("plan.toml", format!("{SHORT}[eval]\nimages = \"all\"\n"));
-    sandbox.run("sweep plan.toml --out none --status --set eval.images=most").ended(2, &["eval.images"]);
-    sandbox.run("sweep plan.toml --out all --status").ended(0, &[]);
+    sandbox
+        .run("sweep plan.toml --out none --status --set eval.images=most")
+        .ended(2, &["eval.images"]);
+    sandbox
+        .run("sweep plan.toml --out all --status")
+        .ended(0, &[]);
 }
 
 #[test]
@@ -480,8 +681,13 @@ fn a_run_of_another_kind_in_a_tasks_folder_is_a_failure_with_its_reason() {
     let sandbox = Sandbox::tiny();
     sandbox.write("plan.toml", SHORT);
     sandbox.write("all/tiny-seed1/training.json", "{}");
-    let said = sandbox.run("sweep plan.toml --out all").ended(1, &["task 1"]);
-    assert!(said.err.contains("the run in this folder is a training"), "{said:?}");
+    let said = sandbox
+        .run("sweep plan.toml --out all")
+        .ended(1, &["task 1"]);
+    assert!(
+        said.err.contains("the run in this folder is a training"),
+        "{said:?}"
+    );
 }
 
 #[test]
@@ -492,14 +698,33 @@ fn a_plans_config_is_beside_the_plan_or_built_in_wherever_one_stands() {
         "config = \"quickstart.toml\"\nset = [\"generations=1\", \"map_elites.initial=4\"]\n",
     );
     sandbox.write("quickstart.toml", TINY);
-    sandbox.run("sweep plans/plan.toml --out all -q").ended(0, &[]);
-    assert_eq!(sandbox.run_file("all/quickstart-seed1").config.body.height, 7);
-    sandbox.write("plans/quickstart.toml", TINY.replace("height = 5", "height = 6"));
-    sandbox.run("sweep plans/plan.toml --out beside -q").ended(0, &[]);
-    assert_eq!(sandbox.run_file("beside/quickstart-seed3").config.body.height, 6);
+    sandbox
+        .run("sweep plans/plan.toml --out all -q")
+        .ended(0, &[]);
+    assert_eq!(
+        sandbox.run_file("all/quickstart-seed1").config.body.height,
+        7
+    );
+    sandbox.write(
+        "plans/quickstart.toml",
+        TINY.replace("height = 5", "height = 6"),
+    );
+    sandbox
+        .run("sweep plans/plan.toml --out beside -q")
+        .ended(0, &[]);
+    assert_eq!(
+        sandbox
+            .run_file("beside/quickstart-seed3")
+            .config
+            .body
+            .height,
+        6
+    );
     sandbox.write("plans/plan.toml", "config = \"own.toml\"\n");
     sandbox.write("own.toml", TINY);
-    sandbox.run("sweep plans/plan.toml --out none").ended(3, &["plans/own.toml: "]);
+    sandbox
+        .run("sweep plans/plan.toml --out none")
+        .ended(3, &["plans/own.toml: "]);
 }
 
 #[test]
@@ -508,7 +733,10 @@ fn other_classes_draw_images_of_their_own() {
     sandbox.write("plan.toml", format!("{SHORT}pairs = [0, 4]\n"));
     sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
     let images = sandbox.run_file("all/tiny-0v4-seed1").training_images;
-    assert_eq!(images.iter().map(|image| image.label).collect::<Vec<_>>(), [0, 4]);
+    assert_eq!(
+        images.iter().map(|image| image.label).collect::<Vec<_>>(),
+        [0, 4]
+    );
 }
 
 #[test]
@@ -518,27 +746,43 @@ fn listed_commands_name_the_images_and_the_atlas_of_this_folder() {
     sandbox.write("plan.toml", "config = \"zero_one.toml\"\n");
     let list = sandbox.run("sweep plan.toml --list").ended(0, &[]).out;
     let data = sandbox.path("data/mnist");
-    assert!(list.contains(&format!("--data {}", data.display())), "{list}");
+    assert!(
+        list.contains(&format!("--data {}", data.display())),
+        "{list}"
+    );
     let atlas = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/atlas");
-    sandbox.write("plan.toml", "archive = \"atlas:zero_one-1\"\npairs = [0, 1]\nseeds = [1]\n");
+    sandbox.write(
+        "plan.toml",
+        "archive = \"atlas:zero_one-1\"\npairs = [0, 1]\nseeds = [1]\n",
+    );
     let mut command = sandbox.command("sweep plan.toml --list".split(' '));
     command.env("MORPHCOG_ATLAS", &atlas);
     let list = said(command).ended(0, &[]).out;
-    assert!(list.starts_with(&format!("env MORPHCOG_ATLAS={} ", atlas.display())), "{list}");
+    assert!(
+        list.starts_with(&format!("env MORPHCOG_ATLAS={} ", atlas.display())),
+        "{list}"
+    );
 }
 
 /// A sandbox with one task and its folder.
 fn one_task() -> (Sandbox, String) {
     let sandbox = sandbox();
-    sandbox.write("plan.toml", PLAN.replace("[1, 2]", "[1]").replace("[4, 8]", "[4]"));
+    sandbox.write(
+        "plan.toml",
+        PLAN.replace("[1, 2]", "[1]").replace("[4, 8]", "[4]"),
+    );
     (sandbox, "all/tiny-parents=4-seed1".to_string())
 }
 
 /// The one row of the table of a sweep with one task.
 fn collected(sandbox: &Sandbox, words: &[&str]) -> BTreeMap<String, String> {
-    sandbox.run("sweep plan.toml --out all --collect").ended(0, words);
+    sandbox
+        .run("sweep plan.toml --out all --collect")
+        .ended(0, words);
     let table = sandbox.read("all/sweep.csv");
-    let rows: Result<Vec<_>, _> = csv::Reader::from_reader(table.as_bytes()).deserialize().collect();
+    let rows: Result<Vec<_>, _> = csv::Reader::from_reader(table.as_bytes())
+        .deserialize()
+        .collect();
     let [mut row] = <[BTreeMap<_, _>; 1]>::try_from(rows.unwrap()).unwrap();
     row.remove("seconds");
     row
@@ -548,7 +792,10 @@ fn collected(sandbox: &Sandbox, words: &[&str]) -> BTreeMap<String, String> {
 fn a_test_with_other_settings_is_never_taken_for_the_plans_own() {
     let (sandbox, folder) = one_task();
     sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
-    let (own, row) = (sandbox.read(&format!("{folder}/eval.json")), collected(&sandbox, &[]));
+    let (own, row) = (
+        sandbox.read(&format!("{folder}/eval.json")),
+        collected(&sandbox, &[]),
+    );
     assert!(!row["accuracy"].is_empty());
     for (setting, key) in [
         ("--cycles 1", "control_steps = 50"),
@@ -557,35 +804,63 @@ fn a_test_with_other_settings_is_never_taken_for_the_plans_own() {
         ("--images 6", "images = 6"),
         ("--robots top:1", "robots = "),
     ] {
-        let others = if setting.contains("robots") { "" } else { "--robots top:2" };
-        let images = if setting.contains("images") { "" } else { "--images 4" };
+        let others = if setting.contains("robots") {
+            ""
+        } else {
+            "--robots top:2"
+        };
+        let images = if setting.contains("images") {
+            ""
+        } else {
+            "--images 4"
+        };
         let words = format!("eval -a {folder} {others} {images} {setting}");
         sandbox.run(&words).ended(0, &["eval.json"]);
         let row = collected(&sandbox, &["eval.json", key]);
-        assert_eq!((row["accuracy"].as_str(), row["state"].as_str()), ("", "stopped"), "{setting}");
-        sandbox.run("sweep plan.toml --out all").ended(0, &["task 1", "eval.json"]);
-        assert_eq!(sandbox.read(&format!("{folder}/eval.json")), own, "{setting}");
+        assert_eq!(
+            (row["accuracy"].as_str(), row["state"].as_str()),
+            ("", "stopped"),
+            "{setting}"
+        );
+        sandbox
+            .run("sweep plan.toml --out all")
+            .ended(0, &["task 1", "eval.json"]);
+        assert_eq!(
+            sandbox.read(&format!("{folder}/eval.json")),
+            own,
+            "{setting}"
+        );
     }
     assert_eq!(collected(&sandbox, &[]), row);
     // Every one of them is still there.
     let kept = files(&sandbox.path(&folder));
-    let kept = kept.keys().filter(|name| name.starts_with("eval-") && name.ends_with(".json"));
+    let kept = kept
+        .keys()
+        .filter(|name| name.starts_with("eval-") && name.ends_with(".json"));
     assert_eq!(kept.count(), 1 + 5);
 }
 
 #[test]
 fn verdicts_and_choices_by_other_settings_are_never_taken_for_the_plans_own() {
     let (sandbox, folder) = one_task();
-    let validation = "set = [\"archive.keep=3\", \"validation.best=1\", \"validation.images=40\"]\n[vary]";
-    sandbox.write("plan.toml", sandbox.read("plan.toml").replace("[vary]", validation));
+    let validation =
+        "set = [\"archive.keep=3\", \"validation.best=1\", \"validation.images=40\"]\n[vary]";
+    sandbox.write(
+        "plan.toml",
+        sandbox.read("plan.toml").replace("[vary]", validation),
+    );
     sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
     let row = collected(&sandbox, &[]);
     assert!(!row["validation_balanced_accuracy"].is_empty() && !row["audited"].is_empty());
     let chosen = "--robots best-validation:2 --validation 42 --images 4 -o other.json";
-    sandbox.run(&format!("eval -q -a {folder} {chosen}")).ended(0, &[]);
+    sandbox
+        .run(&format!("eval -q -a {folder} {chosen}"))
+        .ended(0, &[]);
     assert_eq!(collected(&sandbox, &[]), row);
     std::fs::remove_file(sandbox.path(&format!("{folder}/audit.json"))).unwrap();
-    sandbox.run(&format!("audit -q -a {folder} --set threshold=1")).ended(0, &[]);
+    sandbox
+        .run(&format!("audit -q -a {folder} --set threshold=1"))
+        .ended(0, &[]);
     let row = collected(&sandbox, &["audit.json"]);
     assert!(row["audited"].is_empty(), "{row:?}");
 }
@@ -597,14 +872,23 @@ fn a_done_task_whose_results_are_gone_is_done_again() {
     let before = files(&sandbox.path(&folder));
     for name in ["eval.json", "audit.json", "run.json"] {
         std::fs::remove_file(sandbox.path(&format!("{folder}/{name}"))).unwrap();
-        let said = sandbox.run("sweep plan.toml --out all --status").ended(0, &[]);
+        let said = sandbox
+            .run("sweep plan.toml --out all --status")
+            .ended(0, &[]);
         assert!(said.out.contains(name), "{said:?}");
         assert_eq!(states(&sandbox, "all"), ["stopped"]);
         sandbox.run("sweep plan.toml --out all -q").ended(0, &[]);
         assert_eq!(states(&sandbox, "all"), ["done"]);
         let now = files(&sandbox.path(&folder));
-        assert_eq!(now.keys().collect::<Vec<_>>(), before.keys().collect::<Vec<_>>());
-        assert!(["eval.json", "audit.json", "run.json"].iter().all(|name| now[*name] == before[*name]));
+        assert_eq!(
+            now.keys().collect::<Vec<_>>(),
+            before.keys().collect::<Vec<_>>()
+        );
+        assert!(
+            ["eval.json", "audit.json", "run.json"]
+                .iter()
+                .all(|name| now[*name] == before[*name])
+        );
     }
 }
 
@@ -614,20 +898,41 @@ fn a_done_task_whose_results_are_gone_is_done_again() {
 fn job(change: (&str, &str)) -> std::process::Output {
     use std::os::unix::fs::PermissionsExt;
     let sandbox = Sandbox::tiny();
-    sandbox.write("plan.toml", SHORT.replace("generations=2", "generations=10000000"));
-    let script = sandbox.run("sweep plan.toml --out all --slurm").ended(0, &[]).out;
+    sandbox.write(
+        "plan.toml",
+        SHORT.replace("generations=2", "generations=10000000"),
+    );
+    let script = sandbox
+        .run("sweep plan.toml --out all --slurm")
+        .ended(0, &[])
+        .out;
     assert!(script.contains(change.0), "{script}");
     sandbox.write("job.sh", script.replace(change.0, change.1));
-    let scontrol = sandbox.write("bin/scontrol", "#!/bin/sh\necho \"scontrol $*\" >&2\nexit 1\n");
+    let scontrol = sandbox.write(
+        "bin/scontrol",
+        "#!/bin/sh\necho \"scontrol $*\" >&2\nexit 1\n",
+    );
     std::fs::set_permissions(scontrol, std::fs::Permissions::from_mode(0o755)).unwrap();
-    let path = format!("{}:{}", sandbox.path("bin").display(), std::env::var("PATH").unwrap());
+    let path = format!(
+        "{}:{}",
+        sandbox.path("bin").display(),
+        std::env::var("PATH").unwrap()
+    );
     let mut command = std::process::Command::new("bash");
     SETTINGS.iter().for_each(|name| {
         command.env_remove(name);
     });
-    command.arg("job.sh").current_dir(sandbox.path("")).env("PATH", path);
-    command.env("SLURM_ARRAY_JOB_ID", "7").env("SLURM_ARRAY_TASK_ID", "1").env("TASKS_BEFORE", "1");
-    command.stderr(std::process::Stdio::piped()).stdout(std::process::Stdio::piped());
+    command
+        .arg("job.sh")
+        .current_dir(sandbox.path(""))
+        .env("PATH", path);
+    command
+        .env("SLURM_ARRAY_JOB_ID", "7")
+        .env("SLURM_ARRAY_TASK_ID", "1")
+        .env("TASKS_BEFORE", "1");
+    command
+        .stderr(std::process::Stdio::piped())
+        .stdout(std::process::Stdio::piped());
     let job = command.spawn().unwrap();
     // The second task: one was before.
     wait_for(&sandbox.path("all/tiny-seed2/metrics.csv"));
@@ -641,7 +946,10 @@ fn a_job_with_too_short_a_time_limit_is_not_queued_again() {
     let ended = job(("-lt 10 ]", "-lt 60 ]"));
     let said = String::from_utf8_lossy(&ended.stderr);
     assert_eq!(ended.status.code(), Some(75), "{said}");
-    assert!(said.contains("task 2") && !said.contains("scontrol requeue"), "{said}");
+    assert!(
+        said.contains("task 2") && !said.contains("scontrol requeue"),
+        "{said}"
+    );
 }
 
 #[cfg(unix)]
@@ -650,15 +958,25 @@ fn a_job_that_cannot_be_queued_again_says_what_to_do() {
     let ended = job(("-lt 10 ]", "-lt 0 ]"));
     let said = String::from_utf8_lossy(&ended.stderr);
     assert_eq!(ended.status.code(), Some(75), "{said}");
-    assert!(said.contains("scontrol requeue 7_1") && said.contains("task 2"), "{said}");
+    assert!(
+        said.contains("scontrol requeue 7_1") && said.contains("task 2"),
+        "{said}"
+    );
 }
 
 #[test]
 fn more_tasks_than_slurm_takes_are_said_with_what_to_do() {
     let sandbox = Sandbox::tiny();
     let seeds: Vec<String> = (1..=1100).map(|seed: u32| seed.to_string()).collect();
-    sandbox.write("plan.toml", SHORT.replace("[1, 2]", &format!("[{}]", seeds.join(","))));
-    let words = ["1100 tasks", "MaxArraySize", "sbatch --array=1-100 --export=ALL,TASKS_BEFORE=1000"];
+    sandbox.write(
+        "plan.toml",
+        SHORT.replace("[1, 2]", &format!("[{}]", seeds.join(","))),
+    );
+    let words = [
+        "1100 tasks",
+        "MaxArraySize",
+        "sbatch --array=1-100 --export=ALL,TASKS_BEFORE=1000",
+    ];
     let script = sandbox.run("sweep plan.toml --slurm").ended(0, &words).out;
     assert!(script.contains("#SBATCH --array=1-1000\n"), "{script}");
 }

@@ -55,7 +55,12 @@ impl Session {
                 }
             }
         });
-        Session { keyboard, screen, open: String::new(), shell }
+        Session {
+            keyboard,
+            screen,
+            open: String::new(),
+            shell,
+        }
     }
 
     /// Waits for these words.
@@ -67,7 +72,10 @@ impl Session {
                 self.open.drain(..place + words.len());
                 return;
             }
-            match self.screen.recv_timeout(end.saturating_duration_since(Instant::now())) {
+            match self
+                .screen
+                .recv_timeout(end.saturating_duration_since(Instant::now()))
+            {
                 // Words to wait for are ASCII: pieces may cut other letters in two.
                 Ok(piece) => self.open += &String::from_utf8_lossy(&piece),
                 Err(error) => panic!("expected {words:?}, {error}: {:?}", self.open),
@@ -143,23 +151,36 @@ fn shown(sandbox: &Sandbox, args: &str, columns: u16) -> Vec<String> {
         let end = part.find(|c: char| c.is_ascii_alphabetic()).unwrap();
         seen += &part[end + 1..];
     }
-    seen.split(['\r', '\n']).map(|line| line.trim_end().to_string()).collect()
+    seen.split(['\r', '\n'])
+        .map(|line| line.trim_end().to_string())
+        .collect()
 }
 
 /// Checks that no line is wider than the terminal, but for a single word that is.
 #[track_caller]
 fn check_widths(args: &str, lines: &[String], columns: u16) {
     for line in lines {
-        let is_word = !line.trim_start().trim_end_matches('\\').trim_end().contains(' ');
+        let is_word = !line
+            .trim_start()
+            .trim_end_matches('\\')
+            .trim_end()
+            .contains(' ');
         let fits = line.chars().count() <= usize::from(columns);
-        assert!(fits || is_word, "{args}: {columns} columns: {line:?} in:\n{}", lines.join("\n"));
+        assert!(
+            fits || is_word,
+            "{args}: {columns} columns: {line:?} in:\n{}",
+            lines.join("\n")
+        );
     }
 }
 
 /// Words that are no numbers: those depend on the clock.
 fn words(text: &str) -> BTreeSet<&str> {
     let is_word = |word: &&str| word.contains(char::is_alphabetic);
-    text.split_whitespace().map(|word| word.trim_matches('`')).filter(is_word).collect()
+    text.split_whitespace()
+        .map(|word| word.trim_matches('`'))
+        .filter(is_word)
+        .collect()
 }
 
 #[test]
@@ -172,7 +193,10 @@ fn a_hangup_ends_a_film_and_the_terminal_is_as_it_was() {
     film.shows("space pauses");
     // The shell leads the group of all that runs in its terminal.
     let group = format!("-{}", film.shell.id());
-    let sent = std::process::Command::new("kill").args(["-s", "HUP", "--", &group]).status().unwrap();
+    let sent = std::process::Command::new("kill")
+        .args(["-s", "HUP", "--", &group])
+        .status()
+        .unwrap();
     assert!(sent.success());
     film.shows("\x1b[?25h");
     film.shows("as before, code=75");
@@ -191,8 +215,10 @@ fn a_run_whose_terminal_is_closed_is_saved() {
     for name in SETTINGS.iter().filter(|name| **name != "TERM") {
         command = command.env_remove(name);
     }
-    let command =
-        command.current_dir(sandbox.path(".")).args(evolve.split(' ')).env("TERM", "xterm-256color");
+    let command = command
+        .current_dir(sandbox.path("."))
+        .args(evolve.split(' '))
+        .env("TERM", "xterm-256color");
     let mut child = command.spawn(place).unwrap();
     let mut shown = String::new();
     while !shown.contains(" left") {
@@ -226,7 +252,10 @@ fn every_help_fits_a_terminal_and_its_words_are_whole() {
     for command in commands.split('|') {
         let args = format!("{command} --help");
         let whole = sandbox.run(&args).ended(0, &[]).out;
-        assert!(whole.lines().all(|line| line.chars().count() <= 80), "{command}: {whole}");
+        assert!(
+            whole.lines().all(|line| line.chars().count() <= 80),
+            "{command}: {whole}"
+        );
         for columns in [80, 60] {
             let lines = shown(&sandbox, &args, columns);
             check_widths(&args, &lines, columns);
@@ -252,11 +281,19 @@ fn example(help: &[String], title: &str) -> String {
 fn a_plan_and_a_scenario_are_copied_from_help_as_they_are() {
     for columns in [80, 60] {
         let sandbox = Sandbox::new();
-        sandbox.write("plan.toml", example(&shown(&sandbox, "sweep --help", columns), "plan.toml:"));
+        sandbox.write(
+            "plan.toml",
+            example(&shown(&sandbox, "sweep --help", columns), "plan.toml:"),
+        );
         let status = sandbox.run("sweep plan.toml --status").ended(0, &[]).out;
         assert!(status.contains("9 tasks"), "{status}");
-        sandbox
-            .write("scenario.json", example(&shown(&sandbox, "simulate --help", columns), "scenario.json:"));
+        sandbox.write(
+            "scenario.json",
+            example(
+                &shown(&sandbox, "simulate --help", columns),
+                "scenario.json:",
+            ),
+        );
         let walk = sandbox.run("simulate scenario.json").ended(0, &[]).out;
         assert!(walk.lines().count() > 500, "{walk}");
     }
@@ -321,9 +358,13 @@ fn progress_and_what_is_next_fit_a_terminal() {
         // A command goes on where the line above it says so.
         let text = lines.join("\n").replace("\n\n", "\n");
         let (_, next) = text.split_once("next:").unwrap();
-        let next: Vec<&str> = next.split_whitespace().filter(|word| *word != "\\").collect();
-        let command =
-            format!("morphcog replay --robot best --archive {out}/run.json morphcog eval --archive");
+        let next: Vec<&str> = next
+            .split_whitespace()
+            .filter(|word| *word != "\\")
+            .collect();
+        let command = format!(
+            "morphcog replay --robot best --archive {out}/run.json morphcog eval --archive"
+        );
         assert!(next.join(" ").starts_with(&command), "{text}");
     }
 }

@@ -9,16 +9,21 @@ use std::path::Path;
 /// The commands of a page: lines of `console` blocks that begin with a prompt, without `morphcog`
 /// itself. Quotes hold blanks together.
 fn commands(page: &str) -> Vec<Vec<String>> {
-    let text =
-        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs").join(page)).unwrap();
+    let text = std::fs::read_to_string(
+        Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("docs")
+            .join(page),
+    )
+    .unwrap();
     let mut is_console = false;
     let mut commands = Vec::new();
     for line in text.lines() {
         if line.starts_with("```") {
             is_console = line == "```console";
         } else if is_console {
-            let command =
-                line.strip_prefix("$ morphcog ").expect("a console block has commands of the program");
+            let command = line
+                .strip_prefix("$ morphcog ")
+                .expect("a console block has commands of the program");
             commands.push(words(command));
         }
     }
@@ -57,8 +62,17 @@ fn in_small(mut command: Vec<String>) -> Vec<String> {
         command.extend(["--every", "20"].map(str::to_string));
     }
     if command[0] == "train" {
-        let settings = ["train.images_per_class=20", "train.random_images=60", "train.final_images=10"];
-        command.extend(settings.iter().flat_map(|setting| ["--set", setting]).map(str::to_string));
+        let settings = [
+            "train.images_per_class=20",
+            "train.random_images=60",
+            "train.final_images=10",
+        ];
+        command.extend(
+            settings
+                .iter()
+                .flat_map(|setting| ["--set", setting])
+                .map(str::to_string),
+        );
     }
     command
 }
@@ -75,20 +89,40 @@ fn all_work(page: &str, sandbox: &Sandbox) {
 #[test]
 fn the_program_understands_every_command_of_every_page() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let pages = std::fs::read_dir(root.join("docs")).unwrap().map(|entry| entry.unwrap().path());
+    let pages = std::fs::read_dir(root.join("docs"))
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
     let pages = pages.filter(|path| path.extension().is_some_and(|ending| ending == "md"));
     let mut count = 0;
     for page in pages.chain([root.join("README.md"), root.join("CONTRIBUTING.md")]) {
         let text = std::fs::read_to_string(&page).unwrap();
         for line in text.lines() {
             // Also where another program starts it.
-            let Some((_, command)) = line.split_once("morphcog ").filter(|_| line.starts_with("$ ")) else {
+            let Some((_, command)) = line
+                .split_once("morphcog ")
+                .filter(|_| line.starts_with("$ "))
+            else {
                 continue;
             };
-            let all = words(command.split(['#', '>']).next().unwrap().split(" | ").next().unwrap());
-            let all = all.iter().map(|word| if word == "KIND" { "body" } else { word });
+            let all = words(
+                command
+                    .split(['#', '>'])
+                    .next()
+                    .unwrap()
+                    .split(" | ")
+                    .next()
+                    .unwrap(),
+            );
+            let all = all
+                .iter()
+                .map(|word| if word == "KIND" { "body" } else { word });
             let parsed = Cli::try_parse_from(std::iter::once("morphcog").chain(all));
-            assert!(parsed.is_ok(), "{}: {line}\n{}", page.display(), parsed.unwrap_err());
+            assert!(
+                parsed.is_ok(),
+                "{}: {line}\n{}",
+                page.display(),
+                parsed.unwrap_err()
+            );
             count += 1;
         }
     }
@@ -99,9 +133,11 @@ fn the_program_understands_every_command_of_every_page() {
 fn every_command_of_the_tutorial_works_in_small() {
     let sandbox = Sandbox::new();
     all_work("tutorial.md", &sandbox);
-    for file in
-        ["runs/quickstart-seed1/run.json", "runs/quickstart-seed1/audit.json", "runs/zero-one/eval.json"]
-    {
+    for file in [
+        "runs/quickstart-seed1/run.json",
+        "runs/quickstart-seed1/audit.json",
+        "runs/zero-one/eval.json",
+    ] {
         assert!(sandbox.path(file).exists(), "{file}");
     }
     assert_eq!(sandbox.run_file("runs/quickstart-seed1").generations, 4);
@@ -127,7 +163,9 @@ fn every_command_of_the_page_on_own_images_works_in_small_with_images_of_one_s_o
     };
     let header = |kind: u8, sizes: &[u32]| {
         let mut bytes = vec![0, 0, 8, kind];
-        sizes.iter().for_each(|size| bytes.extend(size.to_be_bytes()));
+        sizes
+            .iter()
+            .for_each(|size| bytes.extend(size.to_be_bytes()));
         bytes
     };
     for split in ["train", "t10k"] {

@@ -22,7 +22,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// A run that is trained on several images of each class.
 fn sandbox() -> Sandbox {
     static RUN: OnceLock<Made> = OnceLock::new();
-    once(&RUN, &TINY.replace("train_images = [0, 1]", "images_per_class = 3"), &[])
+    once(
+        &RUN,
+        &TINY.replace("train_images = [0, 1]", "images_per_class = 3"),
+        &[],
+    )
 }
 
 /// A run of few robots that chose the best two of them at its end.
@@ -44,7 +48,11 @@ fn once(run: &OnceLock<Made>, config: &str, words: &[&str]) -> Sandbox {
 }
 
 fn eval(sandbox: &Sandbox, options: &str) -> EvalFile {
-    sandbox.run(&format!("eval -q --archive run/run.json --images 20 --cycles 1 {options}")).ended(0, &[]);
+    sandbox
+        .run(&format!(
+            "eval -q --archive run/run.json --images 20 --cycles 1 {options}"
+        ))
+        .ended(0, &[]);
     serde_json::from_str(&sandbox.read("run/eval.json")).unwrap()
 }
 
@@ -54,33 +62,64 @@ fn validation_images_are_of_the_training_split_and_were_never_trained_on() {
     let run = sandbox.run_file("run");
     let dataset = load_dataset(&run.config, None, &[Split::Train]).unwrap();
     // All that there are: whatever was trained on is left out.
-    let trained: std::collections::BTreeSet<usize> =
-        TrainingImages::indices(&run.config, &dataset).unwrap().into_iter().collect();
+    let trained: std::collections::BTreeSet<usize> = TrainingImages::indices(&run.config, &dataset)
+        .unwrap()
+        .into_iter()
+        .collect();
     assert_eq!(trained.len(), 6);
-    let of_class =
-        |class| dataset.indices_of(Split::Train, class).iter().filter(|i| !trained.contains(i)).count();
+    let of_class = |class| {
+        dataset
+            .indices_of(Split::Train, class)
+            .iter()
+            .filter(|i| !trained.contains(i))
+            .count()
+    };
     let most = 2 * of_class(0).min(of_class(1));
     let drawn = images(&[&run], &dataset, Some("images"), most).unwrap();
     assert_eq!(drawn.len(), most);
     assert!(drawn.iter().all(|image| !trained.contains(&image.index)));
-    assert!(drawn.iter().all(|image| dataset.label(Split::Train, image.index).unwrap() == image.label));
+    assert!(
+        drawn
+            .iter()
+            .all(|image| dataset.label(Split::Train, image.index).unwrap() == image.label)
+    );
     // Classes take turns: a round on the first of them is fair, too.
-    assert_eq!(drawn[..20].iter().filter(|image| image.label == 0).count(), 10);
+    assert_eq!(
+        drawn[..20].iter().filter(|image| image.label == 0).count(),
+        10
+    );
     assert!(images(&[&run], &dataset, Some("images"), 10 * most).is_err());
 }
 
 #[test]
 fn the_best_on_validation_images_are_found_the_same_every_time_and_kept() {
     let sandbox = sandbox();
-    let first = eval(&sandbox, "--robots best-validation:3 --validation 40 --threads 1");
+    let first = eval(
+        &sandbox,
+        "--robots best-validation:3 --validation 40 --threads 1",
+    );
     assert_eq!(first.robots.len(), 3);
     assert!(first.selected.contains("validation"), "{}", first.selected);
-    let accuracies: Vec<f64> =
-        first.robots.iter().map(|robot| robot.validation.as_ref().unwrap().balanced_accuracy).collect();
+    let accuracies: Vec<f64> = first
+        .robots
+        .iter()
+        .map(|robot| robot.validation.as_ref().unwrap().balanced_accuracy)
+        .collect();
     assert!(accuracies.is_sorted_by(|a, b| a >= b), "{accuracies:?}");
-    assert!(first.robots.iter().all(|robot| robot.validation.as_ref().unwrap().images == 40));
+    assert!(
+        first
+            .robots
+            .iter()
+            .all(|robot| robot.validation.as_ref().unwrap().images == 40)
+    );
     let kept = sandbox.read("run/validation.json");
-    assert_eq!(eval(&sandbox, "--robots best-validation:3 --validation 40 --threads 3"), first);
+    assert_eq!(
+        eval(
+            &sandbox,
+            "--robots best-validation:3 --validation 40 --threads 3"
+        ),
+        first
+    );
     // One that cannot be read stays.
     sandbox.write("run/validation.json", "{");
     sandbox
@@ -88,11 +127,21 @@ fn the_best_on_validation_images_are_found_the_same_every_time_and_kept() {
         .ended(3, &["run/validation.json"]);
     assert_eq!(sandbox.read("run/validation.json"), "{");
     // Another run's is not believed.
-    sandbox.write("run/validation.json", kept.replace("\"key\":\"", "\"key\":\"0"));
-    assert_eq!(eval(&sandbox, "--robots best-validation:3 --validation 40"), first);
+    sandbox.write(
+        "run/validation.json",
+        kept.replace("\"key\":\"", "\"key\":\"0"),
+    );
+    assert_eq!(
+        eval(&sandbox, "--robots best-validation:3 --validation 40"),
+        first
+    );
     // Selected otherwise, a robot has no such figure.
     assert_eq!(
-        eval(&sandbox, "--robots top:2").robots.iter().filter(|robot| robot.validation.is_none()).count(),
+        eval(&sandbox, "--robots top:2")
+            .robots
+            .iter()
+            .filter(|robot| robot.validation.is_none())
+            .count(),
         2
     );
 }
@@ -104,27 +153,52 @@ fn robots_are_compared_on_validation_images_without_a_look_at_the_test_images() 
     let dataset = load_dataset(&run.config, None, &[Split::Train]).unwrap();
     let command = "eval --archive run/run.json --cycles 1 --split validation";
     let said = sandbox
-        .run(&format!("{command} --images 60 --robots best-validation:3 --validation 40"))
+        .run(&format!(
+            "{command} --images 60 --robots best-validation:3 --validation 40"
+        ))
         .ended(0, &[]);
-    assert!(said.out.contains("60 builtin validation images"), "{}", said.out);
+    assert!(
+        said.out.contains("60 builtin validation images"),
+        "{}",
+        said.out
+    );
     // An evaluation on test images is not replaced.
     assert!(!sandbox.path("run/eval.json").exists());
     let report = EvalFile::read(&sandbox.path("run/eval-validation.json")).unwrap();
     assert_eq!(report.split, HeldOut::Validation);
     // By what robots were chosen, they are not compared.
     let selected = images(&[&run], &dataset, Some("images"), 40).unwrap();
-    assert!(report.images.len() == 60 && report.images.iter().all(|image| !selected.contains(image)));
+    assert!(
+        report.images.len() == 60 && report.images.iter().all(|image| !selected.contains(image))
+    );
     // Nor are others of the run, or robots that are named, afterwards.
-    sandbox.run(&format!("{command} --images 60 --robots top:1")).ended(0, &[]);
+    sandbox
+        .run(&format!("{command} --images 60 --robots top:1"))
+        .ended(0, &[]);
     let report = EvalFile::read(&sandbox.path("run/eval-validation.json")).unwrap();
-    assert!(report.images.len() == 60 && report.images.iter().all(|image| !selected.contains(image)));
-    let best = EvalFile::read(&sandbox.path("run/eval-validation.json")).unwrap().robots[0].id.clone();
-    sandbox.run(&format!("{command} --images 60 --robots {best}")).ended(0, &[]);
+    assert!(
+        report.images.len() == 60 && report.images.iter().all(|image| !selected.contains(image))
+    );
+    let best = EvalFile::read(&sandbox.path("run/eval-validation.json"))
+        .unwrap()
+        .robots[0]
+        .id
+        .clone();
+    sandbox
+        .run(&format!("{command} --images 60 --robots {best}"))
+        .ended(0, &[]);
     let report = EvalFile::read(&sandbox.path("run/eval-validation.json")).unwrap();
-    assert!(report.images.len() == 60 && report.images.iter().all(|image| !selected.contains(image)));
+    assert!(
+        report.images.len() == 60 && report.images.iter().all(|image| !selected.contains(image))
+    );
     // Robots of two runs: on images that neither was trained on.
-    sandbox.write("other.toml", sandbox.read("run.toml").replace("seed = 3", "seed = 2"));
-    sandbox.run("evolve -q -c other.toml -o other").ended(0, &[]);
+    sandbox.write(
+        "other.toml",
+        sandbox.read("run.toml").replace("seed = 3", "seed = 2"),
+    );
+    sandbox
+        .run("evolve -q -c other.toml -o other")
+        .ended(0, &[]);
     let other = sandbox.run_file("other");
     assert_ne!(other.config.seed, run.config.seed);
     let both = "eval -q --archive run/run.json other/run.json --cycles 1 --split validation --images 60 --robots top:1";
@@ -138,12 +212,23 @@ fn robots_are_compared_on_validation_images_without_a_look_at_the_test_images() 
     for run in [&run, &other] {
         let trained = TrainingImages::indices(&run.config, &dataset).unwrap();
         assert!(!trained.is_empty());
-        assert!(report.images.iter().all(|image| !trained.contains(&image.index)));
+        assert!(
+            report
+                .images
+                .iter()
+                .all(|image| !trained.contains(&image.index))
+        );
     }
     // What cannot be.
-    sandbox.run(&format!("{command} --images 1000000")).ended(3, &["--images 1000000"]);
-    sandbox.run("eval --archive run/run.json --split train").ended(2, &["--split"]);
-    sandbox.run("capacity --eval run/eval-validation.json").ended(3, &["run/eval-validation.json"]);
+    sandbox
+        .run(&format!("{command} --images 1000000"))
+        .ended(3, &["--images 1000000"]);
+    sandbox
+        .run("eval --archive run/run.json --split train")
+        .ended(2, &["--split"]);
+    sandbox
+        .run("capacity --eval run/eval-validation.json")
+        .ended(3, &["run/eval-validation.json"]);
 }
 
 #[test]
@@ -158,26 +243,44 @@ fn a_run_that_asks_for_it_chooses_robots_at_its_end() {
     assert_eq!(sandbox.read("run/validation.json"), kept);
     let report = EvalFile::read(&sandbox.path("run/eval.json")).unwrap();
     assert_eq!(report.robots.len(), 2);
-    assert!(report.robots.iter().all(|robot| robot.validation.as_ref().unwrap().images == 40));
+    assert!(
+        report
+            .robots
+            .iter()
+            .all(|robot| robot.validation.as_ref().unwrap().images == 40)
+    );
     // Who asks for fewer gets the first of those.
-    let said = sandbox.run("eval --archive run/run.json --robots best-validation:1 --images 4").ended(0, &[]);
+    let said = sandbox
+        .run("eval --archive run/run.json --robots best-validation:1 --images 4")
+        .ended(0, &[]);
     assert!(!said.err.contains("validating"), "{}", said.err);
     assert_eq!(sandbox.read("run/validation.json"), kept);
-    let fewer = EvalFile::read(&sandbox.path("run/eval.json")).unwrap().robots;
+    let fewer = EvalFile::read(&sandbox.path("run/eval.json"))
+        .unwrap()
+        .robots;
     let ids = |robots: &[morphcog::store::eval::RobotReport]| {
-        robots.iter().map(|robot| robot.id.clone()).collect::<Vec<_>>()
+        robots
+            .iter()
+            .map(|robot| robot.id.clone())
+            .collect::<Vec<_>>()
     };
     assert_eq!((fewer.len(), ids(&fewer)), (1, ids(&report.robots[..1])));
     // A file of a newer version is not written over.
     let newer = kept.replace("\"format_version\":1", "\"format_version\":2");
     sandbox.write("run/validation.json", &newer);
-    sandbox.run(&format!("eval {archive}")).ended(3, &["run/validation.json: format_version"]);
+    sandbox
+        .run(&format!("eval {archive}"))
+        .ended(3, &["run/validation.json: format_version"]);
     assert_eq!(sandbox.read("run/validation.json"), newer);
     std::fs::remove_file(sandbox.path("run/validation.json")).unwrap();
-    sandbox.run(&format!("eval {archive}")).ended(0, &["validating"]);
+    sandbox
+        .run(&format!("eval {archive}"))
+        .ended(0, &["validating"]);
     assert_eq!(sandbox.read("run/validation.json"), kept);
     // A run that is resumed at its end, with nothing left to do, says it again.
-    sandbox.run("evolve -c run.toml -o run --resume").ended(0, &[]);
+    sandbox
+        .run("evolve -c run.toml -o run --resume")
+        .ended(0, &[]);
     assert_eq!(sandbox.read("run/validation.json"), kept);
 }
 
@@ -185,11 +288,15 @@ fn a_run_that_asks_for_it_chooses_robots_at_its_end() {
 fn too_few_or_too_many_validation_images_are_refused() {
     let sandbox = sandbox();
     let with = |options: &str| {
-        sandbox.run(&format!("eval --archive run/run.json --robots best-validation {options}"))
+        sandbox.run(&format!(
+            "eval --archive run/run.json --robots best-validation {options}"
+        ))
     };
     with("--validation 10").ended(2, &["--validation 10", "40"]);
     with("--validation 1000000").ended(3, &["--validation 1000000"]);
-    sandbox.run("eval --archive run/run.json --validation 40").ended(2, &["--validation", "best-validation"]);
+    sandbox
+        .run("eval --archive run/run.json --validation 40")
+        .ended(2, &["--validation", "best-validation"]);
 }
 
 #[test]
@@ -197,14 +304,25 @@ fn nothing_is_chosen_by_other_images_of_the_same_number() {
     let sandbox = validated();
     let other = sandbox.read("run/run.json");
     let sha256 = &sandbox.run_file("run").dataset.train_sha256;
-    sandbox.write("other/run.json", other.replace(sha256.as_str(), &"0".repeat(64)));
-    for options in ["--robots best-validation:1 --validation 40", "--robots top:1 --split validation"] {
+    sandbox.write(
+        "other/run.json",
+        other.replace(sha256.as_str(), &"0".repeat(64)),
+    );
+    for options in [
+        "--robots best-validation:1 --validation 40",
+        "--robots top:1 --split validation",
+    ] {
         sandbox
-            .run(&format!("eval --archive other/run.json --images 20 {options}"))
+            .run(&format!(
+                "eval --archive other/run.json --images 20 {options}"
+            ))
             .ended(3, &["SHA-256", "--data"]);
     }
-    for command in ["replay -a other/run.json -o x.png", "replay -a other -i test:1 -o x.png", "report other"]
-    {
+    for command in [
+        "replay -a other/run.json -o x.png",
+        "replay -a other -i test:1 -o x.png",
+        "report other",
+    ] {
         sandbox.run(command).ended(3, &["SHA-256"]);
     }
 }
@@ -215,19 +333,40 @@ fn a_run_that_will_leave_too_few_of_them_is_refused_before_it_begins() {
     // Training takes 30 of the 40 images of each class, and leaves 10 where 20 are asked for.
     let few = TINY.replace("[data]\n", "[data]\nbuiltin = { train_per_class = 40 }\n");
     let few = few.replace("train_images = [0, 1]", "images_per_class = 30");
-    sandbox.write("run.toml", format!("{few}[validation]\nimages = 40\nbest = 1\n"));
-    let refused = ["validation.images = 40", "20", "data.images_per_class", "validation.best"];
-    sandbox.run("evolve -q -c run.toml -o run").ended(3, &refused);
+    sandbox.write(
+        "run.toml",
+        format!("{few}[validation]\nimages = 40\nbest = 1\n"),
+    );
+    let refused = [
+        "validation.images = 40",
+        "20",
+        "data.images_per_class",
+        "validation.best",
+    ];
+    sandbox
+        .run("evolve -q -c run.toml -o run")
+        .ended(3, &refused);
     assert!(!sandbox.path("run").exists());
     // One that leaves none has none to be tested on, however many are asked for.
-    sandbox.write("all.toml", few.replace("images_per_class = 30", "images_per_class = 40"));
-    sandbox.run("evolve -q -c all.toml -o all -g 1 --set map_elites.initial=2").ended(0, &[]);
-    sandbox.run("eval -a all --split validation --images all").ended(3, &["--images all: ", "class 0"]);
+    sandbox.write(
+        "all.toml",
+        few.replace("images_per_class = 30", "images_per_class = 40"),
+    );
+    sandbox
+        .run("evolve -q -c all.toml -o all -g 1 --set map_elites.initial=2")
+        .ended(0, &[]);
+    sandbox
+        .run("eval -a all --split validation --images all")
+        .ended(3, &["--images all: ", "class 0"]);
     // Nor is one begun in a folder that is there already.
     std::fs::create_dir(sandbox.path("empty")).unwrap();
-    sandbox.run("evolve -q -c run.toml -o empty --resume").ended(3, &refused);
+    sandbox
+        .run("evolve -q -c run.toml -o empty --resume")
+        .ended(3, &refused);
     // Who does not choose any needs none.
-    sandbox.run("evolve -q -c run.toml -o run -g 1 --set validation.best=0").ended(0, &[]);
+    sandbox
+        .run("evolve -q -c run.toml -o run -g 1 --set validation.best=0")
+        .ended(0, &[]);
 }
 
 #[test]
@@ -239,7 +378,9 @@ fn those_that_are_best_on_validation_images_can_be_audited_by_themselves() {
     // Found before, they are not searched for again; eval finds the same.
     let said = sandbox.run(audit).ended(0, &[]);
     assert!(!said.err.contains("validating"), "{}", said.err);
-    sandbox.run("eval -q --archive run/run.json --images 4 --robots best-validation:2").ended(0, &[]);
+    sandbox
+        .run("eval -q --archive run/run.json --images 4 --robots best-validation:2")
+        .ended(0, &[]);
     let best: EvalFile = serde_json::from_str(&sandbox.read("run/eval.json")).unwrap();
     let audit = AuditFile::read(&sandbox.path("run/audit.json")).unwrap();
     let mut audited: Vec<&String> = audit.robots.iter().map(|robot| &robot.id).collect();
@@ -255,7 +396,10 @@ fn evolve_itself_chooses_robots_at_its_end_and_so_whatever_calls_it() {
     struct Quiet<'a>(Option<&'a AtomicBool>);
     impl Observer for Quiet<'_> {
         fn generation(&self, now: &Generation) {
-            self.0.iter().filter(|_| now.done > 0).for_each(|stop| stop.store(true, Ordering::Relaxed));
+            self.0
+                .iter()
+                .filter(|_| now.done > 0)
+                .for_each(|stop| stop.store(true, Ordering::Relaxed));
         }
         fn warning(&self, text: &str) {
             panic!("{text}");
@@ -269,17 +413,30 @@ fn evolve_itself_chooses_robots_at_its_end_and_so_whatever_calls_it() {
         out: sandbox.path(folder),
         if_exists: IfExists::Refuse,
     };
-    let finished = evolve(&options("library"), &Session::new(&NEVER, &Quiet(None)).threads(Some(1))).unwrap();
+    let finished = evolve(
+        &options("library"),
+        &Session::new(&NEVER, &Quiet(None)).threads(Some(1)),
+    )
+    .unwrap();
     assert!(!finished.stopped);
     assert_eq!(finished.validated.len(), 2);
     let first = &finished.validated[0];
-    assert_eq!((first.images, finished.best()), (40, Some(first.id.as_str())));
+    assert_eq!(
+        (first.images, finished.best()),
+        (40, Some(first.id.as_str()))
+    );
     // The program does the same.
-    assert_eq!(sandbox.read("library/validation.json"), sandbox.read("run/validation.json"));
+    assert_eq!(
+        sandbox.read("library/validation.json"),
+        sandbox.read("run/validation.json")
+    );
     // Stopped before its last generation, a run chooses none.
     let stop = AtomicBool::new(false);
-    let stopped =
-        evolve(&options("stopped"), &Session::new(&stop, &Quiet(Some(&stop))).threads(Some(1))).unwrap();
+    let stopped = evolve(
+        &options("stopped"),
+        &Session::new(&stop, &Quiet(Some(&stop))).threads(Some(1)),
+    )
+    .unwrap();
     assert!(stopped.stopped && stopped.validated.is_empty());
     assert!(!sandbox.path("stopped/validation.json").exists());
 }
@@ -299,19 +456,27 @@ fn the_best_robot_is_the_first_on_validation_images_where_the_run_ranked_them_el
     ranking["robots"][0]["task"] = first.task.as_str().into();
     sandbox.write("run/validation.json", ranking.to_string());
     let is_best = |id: &str| {
-        sandbox.run("eval -q -a run/run.json --images 4 --cycles 1 --robots best").ended(0, &[]);
+        sandbox
+            .run("eval -q -a run/run.json --images 4 --cycles 1 --robots best")
+            .ended(0, &[]);
         let report = EvalFile::read(&sandbox.path("run/eval.json")).unwrap();
         assert_eq!((report.robots.len(), report.robots[0].id.as_str()), (1, id));
-        sandbox.run("audit -q -a run/run.json --robots best -o audit.json").ended(0, &[]);
+        sandbox
+            .run("audit -q -a run/run.json --robots best -o audit.json")
+            .ended(0, &[]);
         let audit = AuditFile::read(&sandbox.path("audit.json")).unwrap();
         assert!(audit.robot(id).is_some() && audit.robots.len() == 1);
         sandbox.run("plot body -a run/run.json").ended(0, &[]);
         assert!(sandbox.path(&format!("run/plot-body-{id}.svg")).exists());
-        sandbox.run("replay -a run/run.json --format png").ended(0, &[]);
+        sandbox
+            .run("replay -a run/run.json --format png")
+            .ended(0, &[]);
         assert!(sandbox.path(&format!("run/replay-{id}.png")).exists());
-        for name in
-            ["audit.json".to_string(), format!("run/plot-body-{id}.svg"), format!("run/replay-{id}.png")]
-        {
+        for name in [
+            "audit.json".to_string(),
+            format!("run/plot-body-{id}.svg"),
+            format!("run/replay-{id}.png"),
+        ] {
             std::fs::remove_file(sandbox.path(&name)).unwrap();
         }
     };
@@ -322,7 +487,9 @@ fn the_best_robot_is_the_first_on_validation_images_where_the_run_ranked_them_el
     is_best(&fittest.id);
     // One that is broken is no reason to show another robot.
     sandbox.write("run/validation.json", &ranking.to_string()[..60]);
-    sandbox.run("replay -a run/run.json --format png").ended(3, &["run/validation.json"]);
+    sandbox
+        .run("replay -a run/run.json --format png")
+        .ended(3, &["run/validation.json"]);
     std::fs::remove_file(sandbox.path("run/validation.json")).unwrap();
     is_best(&fittest.id);
 }

@@ -25,9 +25,14 @@ fn with_run() -> Sandbox {
     // Where its images are is another place in every sandbox.
     let here = sandbox.path("there").to_str().unwrap().to_string();
     let run = RUN.get_or_init(|| {
-        sandbox.run("evolve -q -c shapes.toml -o runs/one -g 6 --data there").ended(0, &[]);
+        sandbox
+            .run("evolve -q -c shapes.toml -o runs/one -g 6 --data there")
+            .ended(0, &[]);
         let text = |content| String::from_utf8(content).unwrap().replace(&here, "HERE");
-        files(&sandbox.path("runs/one")).into_iter().map(|(name, content)| (name, text(content))).collect()
+        files(&sandbox.path("runs/one"))
+            .into_iter()
+            .map(|(name, content)| (name, text(content)))
+            .collect()
     });
     for (name, content) in run {
         sandbox.write(&format!("runs/one/{name}"), content.replace("HERE", &here));
@@ -55,17 +60,24 @@ const COMMANDS: [&str; 9] = [
 fn a_run_remembers_where_its_images_were() {
     let sandbox = with_run();
     sandbox
-        .run(&format!("evolve -q -c shapes.toml -o runs/new -g 1 --data there {UNVALIDATED}"))
+        .run(&format!(
+            "evolve -q -c shapes.toml -o runs/new -g 1 --data there {UNVALIDATED}"
+        ))
         .ended(0, &[]);
     let text = sandbox.read("runs/new/data-folder.json");
     assert_eq!(sandbox.read("runs/one/data-folder.json"), text);
     let file: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!(file["dataset"], "shapes");
-    assert_eq!(file["folder"].as_str().unwrap(), sandbox.path("there").to_str().unwrap());
+    assert_eq!(
+        file["folder"].as_str().unwrap(),
+        sandbox.path("there").to_str().unwrap()
+    );
     for command in COMMANDS {
         sandbox.run(command).ended(0, &[]);
     }
-    let sets = Server::start(&sandbox, "--archive runs/one").get("/api/images").body;
+    let sets = Server::start(&sandbox, "--archive runs/one")
+        .get("/api/images")
+        .body;
     assert!(sets.contains("shapes"), "{sets}");
     // It is of the run, so nothing is written over it, and a run that takes its place has none of
     // it.
@@ -92,7 +104,9 @@ fn a_sweep_over_a_run_looks_where_the_run_remembers() {
     );
     sandbox.run("sweep -q plan.toml --out all").ended(0, &[]);
     // Another place is no better than none.
-    sandbox.run("sweep -q plan.toml --out again --data nowhere").ended(3, &["nowhere"]);
+    sandbox
+        .run("sweep -q plan.toml --out again --data nowhere")
+        .ended(3, &["nowhere"]);
 }
 
 #[test]
@@ -103,7 +117,9 @@ fn a_training_that_takes_the_place_of_another_takes_nothing_of_it() {
                   --set train.final_images=4 --set train.challengers=1 --set train.images_per_class=30 \
                   --set validation.images=40 --set validation.best=0";
     let train = format!("train -q -a runs/one --task 0|1 --robots top:1 {little} -o taught");
-    sandbox.run(&format!("{train} --data elsewhere")).ended(0, &[]);
+    sandbox
+        .run(&format!("{train} --data elsewhere"))
+        .ended(0, &[]);
     let of = |sandbox: &Sandbox| sandbox.run_file("taught").dataset;
     let before = of(&sandbox);
     sandbox.run(&format!("{train} --force")).ended(0, &[]);
@@ -115,8 +131,13 @@ fn a_training_that_takes_the_place_of_another_takes_nothing_of_it() {
 fn where_the_images_lie_is_no_part_of_the_run() {
     let sandbox = with_run();
     write_dataset(&sandbox, "elsewhere/shapes", 1);
-    sandbox.run("evolve -q -c shapes.toml -o runs/two -g 6 --data elsewhere").ended(0, &[]);
-    assert_eq!(sandbox.read("runs/one/run.json"), sandbox.read("runs/two/run.json"));
+    sandbox
+        .run("evolve -q -c shapes.toml -o runs/two -g 6 --data elsewhere")
+        .ended(0, &[]);
+    assert_eq!(
+        sandbox.read("runs/one/run.json"),
+        sandbox.read("runs/two/run.json")
+    );
     let folder = sandbox.read("runs/two/data-folder.json");
     assert!(folder.contains("elsewhere/shapes"), "{folder}");
 }
@@ -127,12 +148,19 @@ fn a_folder_that_is_gone_is_one_error_that_says_where_it_was_looked_for() {
     sandbox.run(COMMANDS[0]).ended(0, &[]);
     rename(sandbox.path("there"), sandbox.path("moved")).unwrap();
     for command in COMMANDS {
-        let words = ["runs/one/data-folder.json", "there", "data/shapes", "--data"];
+        let words = [
+            "runs/one/data-folder.json",
+            "there",
+            "data/shapes",
+            "--data",
+        ];
         let said = sandbox.run(command).ended(3, &words);
         assert_eq!(said.err.matches("error:").count(), 1, "{}", said.err);
     }
     for command in COMMANDS {
-        sandbox.run(&format!("{command} --data moved")).ended(0, &[]);
+        sandbox
+            .run(&format!("{command} --data moved"))
+            .ended(0, &[]);
     }
     // Named once more when it went on, they are known again.
     sandbox.run(COMMANDS[0]).ended(0, &[]);
@@ -148,16 +176,21 @@ fn what_the_user_says_comes_before_what_a_run_remembers() {
     let sandbox = with_run();
     write_dataset(&sandbox, "other", 2);
     std::fs::create_dir(sandbox.path("empty")).unwrap();
-    sandbox.run(&format!("{} --data other", COMMANDS[0])).ended(3, &["other", "SHA-256"]);
+    sandbox
+        .run(&format!("{} --data other", COMMANDS[0]))
+        .ended(3, &["other", "SHA-256"]);
     let mut command = sandbox.command(COMMANDS[0].split_whitespace());
     command.env("MORPHCOG_DATA", "empty");
     said(command).ended(3, &["empty", "MORPHCOG_DATA"]);
     sandbox.write("runs/one/data-folder.json", "{}");
-    sandbox.run(COMMANDS[0]).ended(3, &["runs/one/data-folder.json", "--data"]);
-    sandbox.run(&format!("{} --data there", COMMANDS[0])).ended(0, &[]);
+    sandbox
+        .run(COMMANDS[0])
+        .ended(3, &["runs/one/data-folder.json", "--data"]);
+    sandbox
+        .run(&format!("{} --data there", COMMANDS[0]))
+        .ended(0, &[]);
     // One that someone wrote may go from the run's folder on.
-    let text =
-        r#"{"format":"morphcog-data-folder","format_version":1,"dataset":"shapes","folder":"../../there"}"#;
+    let text = r#"{"format":"morphcog-data-folder","format_version":1,"dataset":"shapes","folder":"../../there"}"#;
     sandbox.write("runs/one/data-folder.json", text);
     sandbox.run(COMMANDS[0]).ended(0, &[]);
 }
@@ -168,10 +201,17 @@ fn an_evaluation_on_other_images_than_the_runs_is_refused() {
     sandbox.run(COMMANDS[0]).ended(0, &[]);
     let before = sandbox.read("runs/one/eval.json");
     write_dataset(&sandbox, "there", 2);
-    let said = sandbox.run(COMMANDS[0]).ended(3, &["SHA-256", "there", "--data", "--dataset NAME"]);
-    assert_eq!((said.out.as_str(), sandbox.read("runs/one/eval.json")), ("", before));
+    let said = sandbox
+        .run(COMMANDS[0])
+        .ended(3, &["SHA-256", "there", "--data", "--dataset NAME"]);
+    assert_eq!(
+        (said.out.as_str(), sandbox.read("runs/one/eval.json")),
+        ("", before)
+    );
     // Networks on other images are worth nothing beside its robots.
-    sandbox.run(COMMANDS[7]).ended(3, &["SHA-256", "runs/one/eval.json", "--data"]);
+    sandbox
+        .run(COMMANDS[7])
+        .ended(3, &["SHA-256", "runs/one/eval.json", "--data"]);
 }
 
 #[test]
@@ -189,9 +229,10 @@ fn test_images_are_needed_only_where_they_are_shown() {
     ] {
         sandbox.run(command).ended(0, &[]);
     }
-    for command in
-        ["eval -a runs/one --images 8 --cycles 1", "replay -a runs/one --images test:3 -o replay.png"]
-    {
+    for command in [
+        "eval -a runs/one --images 8 --cycles 1",
+        "replay -a runs/one --images test:3 -o replay.png",
+    ] {
         sandbox.run(command).ended(3, &["t10k-images-idx3-ubyte"]);
     }
 }
@@ -214,18 +255,40 @@ fn robots_are_shown_another_dataset_if_it_is_asked_for_and_the_results_say_so() 
     assert_eq!(setting.data.dataset, "builtin");
     assert_ne!(setting.train_sha256, run.dataset.train_sha256);
     assert_eq!(report.baselines.len(), 1);
-    assert!(report.baselines.values().all(|baselines| baselines.nearest_training_image.is_none()));
+    assert!(
+        report
+            .baselines
+            .values()
+            .all(|baselines| baselines.nearest_training_image.is_none())
+    );
     sandbox.run("plot accuracy -a runs/one").ended(0, &[]);
-    assert!(sandbox.read("runs/one/plot-accuracy.svg").contains("trained on shapes"));
+    assert!(
+        sandbox
+            .read("runs/one/plot-accuracy.svg")
+            .contains("trained on shapes")
+    );
     sandbox.run("report runs/one --rollouts 0").ended(0, &[]);
-    assert!(sandbox.read("runs/one/report.html").contains("trained on shapes"));
-    sandbox.run(COMMANDS[7]).ended(3, &["runs/one/eval.json", "shapes", "builtin", "morphcog eval"]);
+    assert!(
+        sandbox
+            .read("runs/one/report.html")
+            .contains("trained on shapes")
+    );
+    sandbox.run(COMMANDS[7]).ended(
+        3,
+        &["runs/one/eval.json", "shapes", "builtin", "morphcog eval"],
+    );
     // Who is best is told by the run's own images.
-    sandbox.run(&format!("{command} best-validation:1 --validation 40")).ended(0, &[]);
+    sandbox
+        .run(&format!("{command} best-validation:1 --validation 40"))
+        .ended(0, &[]);
     assert_eq!(read().robots[0].validation.as_ref().unwrap().images, 40);
-    sandbox.run(&format!("{command} top:1 --split validation")).ended(2, &["--dataset", "test images only"]);
+    sandbox
+        .run(&format!("{command} top:1 --split validation"))
+        .ended(2, &["--dataset", "test images only"]);
     // Its own name changes nothing.
-    sandbox.run(&format!("{} --dataset shapes", COMMANDS[0])).ended(0, &[]);
+    sandbox
+        .run(&format!("{} --dataset shapes", COMMANDS[0]))
+        .ended(0, &[]);
     let named = sandbox.read("runs/one/eval.json");
     sandbox.run(COMMANDS[0]).ended(0, &[]);
     assert_eq!(sandbox.read("runs/one/eval.json"), named);
@@ -235,7 +298,13 @@ fn robots_are_shown_another_dataset_if_it_is_asked_for_and_the_results_say_so() 
         .run("eval --robots XFJPI --dataset builtin --images 2 --cycles 1 -o published.json")
         .ended(0, &[]);
     let report = EvalFile::read(&sandbox.path("published.json")).unwrap();
-    assert_eq!((report.dataset.as_str(), report.trained_on.unwrap().name.as_str()), ("builtin", "mnist"));
+    assert_eq!(
+        (
+            report.dataset.as_str(),
+            report.trained_on.unwrap().name.as_str()
+        ),
+        ("builtin", "mnist")
+    );
 }
 
 #[test]
@@ -252,7 +321,10 @@ fn mnist_is_known_by_any_name() {
     let words = ["train: these are the images of mnist", "test: ", "mine"];
     info("mine", &[]).ended(0, &words);
     let event = &info("mine", &["--json"]).json_lines()[0];
-    assert_eq!(event["known_as"], serde_json::json!({"train": "mnist", "test": "mnist"}));
+    assert_eq!(
+        event["known_as"],
+        serde_json::json!({"train": "mnist", "test": "mnist"})
+    );
     assert!(!info("mnist", &[]).err.contains("these are the images of"));
     // Under the name of another published dataset it would be taken for that.
     let mut command =
@@ -276,8 +348,12 @@ fn a_run_is_shown_its_images_the_way_it_was_made_with_them_whatever_their_files_
     }
     // A run that is made with them says how they are seen.
     let evolve = format!("evolve -c shapes.toml -g 2 --data there {UNVALIDATED} -o");
-    sandbox.run(&format!("{evolve} runs/turned")).ended(0, &["data.transpose = false"]);
-    let same = sandbox.run(&format!("{evolve} runs/same --set data.transpose=false")).ended(0, &[]);
+    sandbox
+        .run(&format!("{evolve} runs/turned"))
+        .ended(0, &["data.transpose = false"]);
+    let same = sandbox
+        .run(&format!("{evolve} runs/same --set data.transpose=false"))
+        .ended(0, &[]);
     assert!(!same.err.contains("data.transpose"), "{}", same.err);
     let of = |run: &str| sandbox.run_file(run).dataset;
     assert_eq!(of("runs/same"), of("runs/one"));
@@ -286,7 +362,9 @@ fn a_run_is_shown_its_images_the_way_it_was_made_with_them_whatever_their_files_
     // And goes on so when they have other names.
     remove_dir_all(sandbox.path("there")).unwrap();
     write_dataset(&sandbox, "there", 1);
-    sandbox.run("eval -a runs/turned --images 8 --cycles 1 --robots top:2").ended(0, &[]);
+    sandbox
+        .run("eval -a runs/turned --images 8 --cycles 1 --robots top:2")
+        .ended(0, &[]);
     let wrong = "evolve -c tiny.toml -o runs/two --set data.transpose=true";
     sandbox.write("tiny.toml", TINY);
     sandbox.run(wrong).ended(3, &["data.transpose"]);
@@ -303,11 +381,16 @@ fn a_tilde_in_a_path_is_the_home_folder() {
     };
     let evolve = format!("evolve -q -c ~/shapes.toml -g 1 {UNVALIDATED}");
     at_home(&format!("{evolve} -o runs/two --set data.dir=~/there")).ended(0, &[]);
-    assert_eq!(sandbox.read("runs/two/run.json").matches("~/there").count(), 1);
+    assert_eq!(
+        sandbox.read("runs/two/run.json").matches("~/there").count(),
+        1
+    );
     at_home(&format!("{evolve} -o runs/three --data=~/there")).ended(0, &[]);
     at_home("data info shapes --data=~/there").ended(0, &[]);
     // What a folder is really called is no home folder.
-    sandbox.run("evolve -c shapes.toml -o runs/four --data=~there").ended(3, &["~there"]);
+    sandbox
+        .run("evolve -c shapes.toml -o runs/four --data=~there")
+        .ended(3, &["~there"]);
     sandbox.write(
         "plans/plan.toml",
         "archive = \"~/runs/one\"\nrobots = \"top:1\"\ngroups = [\"0|1\"]\n\
@@ -322,7 +405,9 @@ fn test_images_of_any_size_are_shown_to_robots_on_the_page() {
     let sandbox = Sandbox::new();
     write_images(&sandbox, "there/", [150, 200], 1);
     sandbox.write("shapes.toml", TINY.replace("\"builtin\"", "\"shapes\""));
-    sandbox.run("evolve -q -c shapes.toml -o runs/one --data there").ended(0, &[]);
+    sandbox
+        .run("evolve -q -c shapes.toml -o runs/one --data there")
+        .ended(0, &[]);
     let robot = &sandbox.run_file("runs/one").elites[0].id;
     let server = Server::start(&sandbox, "--archive runs/one");
     let shown = |archive: usize| {
@@ -331,6 +416,9 @@ fn test_images_of_any_size_are_shown_to_robots_on_the_page() {
         });
         server.post("/api/stimulus", &asked)
     };
-    let answer = (0..9).map(shown).find(|answer| answer.status == 200).unwrap();
+    let answer = (0..9)
+        .map(shown)
+        .find(|answer| answer.status == 200)
+        .unwrap();
     assert!(answer.body.contains("\"label\":1"), "{}", answer.body);
 }

@@ -118,8 +118,14 @@ impl Case {
                 self.outcome += &format!("{error} ");
                 let explained = explain(&error);
                 assert!(explained.message.contains(file), "names no file: {error:?}");
-                assert!(matches!(error.kind, ErrorKind::Input | ErrorKind::Unstable), "{error:?}");
-                for text in [Some(&explained.message), explained.hint.as_ref()].into_iter().flatten() {
+                assert!(
+                    matches!(error.kind, ErrorKind::Input | ErrorKind::Unstable),
+                    "{error:?}"
+                );
+                for text in [Some(&explained.message), explained.hint.as_ref()]
+                    .into_iter()
+                    .flatten()
+                {
                     assert!(!text.contains(is_unseen), "not harmless: {text:?}");
                     assert!(text.chars().count() < 2000, "overlong: {text}");
                 }
@@ -147,15 +153,22 @@ impl World {
     fn new() -> Self {
         let sandbox = Sandbox::new();
         sandbox.write("few.toml", FEW);
-        sandbox.run("evolve -q --config few.toml --out run").ended(0, &[]);
-        sandbox.run("eval -q --archive run/run.json --images 2 --cycles 1 --robots top:2").ended(0, &[]);
-        let audit = "audit -q --archive run/run.json --robots top:2 --set perturbations.time_step=[2]";
+        sandbox
+            .run("evolve -q --config few.toml --out run")
+            .ended(0, &[]);
+        sandbox
+            .run("eval -q --archive run/run.json --images 2 --cycles 1 --robots top:2")
+            .ended(0, &[]);
+        let audit =
+            "audit -q --archive run/run.json --robots top:2 --set perturbations.time_step=[2]";
         sandbox.run(audit).ended(0, &[]);
         sandbox
             .run("team -q --archive run/run.json --classes 0,1 --images 4 --out run/team.json")
             .ended(0, &[]);
         let networks = "--set trainings=1 --set sizes=[1,3] --set networks=[\"mlp\"]";
-        sandbox.run(&format!("capacity -q --eval run/eval.json {networks}")).ended(0, &[]);
+        sandbox
+            .run(&format!("capacity -q --eval run/eval.json {networks}"))
+            .ended(0, &[]);
         let scenario = json!({
             "body": [[3, 4, 1], [6, 2, 5]], "stimuli": [[[0, 1, 0.5], [1, 0, 0]], [[0, 0, 0], [1, 1, 1]]],
             "switch_every": 10, "reset_between": true, "start_column": 3, "start_row": 2, "control_steps": 30,
@@ -185,21 +198,38 @@ impl World {
             seeds.insert(kind, std::fs::read(sandbox.path(name)).unwrap());
         }
         let archives = vec![sandbox.path("run/run.json")];
-        let (service, _) =
-            Service::open(&serve::ServeOptions { archives, ..serve::ServeOptions::default() }).unwrap();
+        let (service, _) = Service::open(&serve::ServeOptions {
+            archives,
+            ..serve::ServeOptions::default()
+        })
+        .unwrap();
         let server = Server::bind(service, 0).unwrap();
-        let port = server.url().rsplit(':').next().unwrap().trim_end_matches('/').parse().unwrap();
+        let port = server
+            .url()
+            .rsplit(':')
+            .next()
+            .unwrap()
+            .trim_end_matches('/')
+            .parse()
+            .unwrap();
         static NEVER: AtomicBool = AtomicBool::new(false);
         std::thread::spawn(move || server.run(&NEVER));
-        World { sandbox, seeds, port }
+        World {
+            sandbox,
+            seeds,
+            port,
+        }
     }
 
     /// A copy of the run in a folder of its own, with one file replaced.
     fn with(&self, name: &str, content: &[u8]) -> PathBuf {
         let folder = self.sandbox.path("hostile");
-        for (kind, own) in
-            [("run", "run.json"), ("eval", "eval.json"), ("audit", "audit.json"), ("metrics", "metrics.csv")]
-        {
+        for (kind, own) in [
+            ("run", "run.json"),
+            ("eval", "eval.json"),
+            ("audit", "audit.json"),
+            ("metrics", "metrics.csv"),
+        ] {
             let is_other = own != name;
             std::fs::create_dir_all(&folder).unwrap();
             if is_other {
@@ -218,13 +248,18 @@ impl World {
         }
         let text = serde_json::from_slice::<Value>(seed).unwrap();
         let text = value(dice, &text).to_string().into_bytes();
-        if dice.below(8) == 0 { bytes(dice, &text) } else { text }
+        if dice.below(8) == 0 {
+            bytes(dice, &text)
+        } else {
+            text
+        }
     }
 
     /// Makes a figure, and looks at what was said.
     fn plot(&self, case: &mut Case, kind: FigureKind, archive: &Path, name: &str) {
         let (out, err) = (Page::default(), Page::default());
-        let console = Console::with_writers(Mode::Human, Box::new(out.clone()), Box::new(err.clone()));
+        let console =
+            Console::with_writers(Mode::Human, Box::new(out.clone()), Box::new(err.clone()));
         let reporter = Reporter::new(&console);
         let wanted = PlotOptions {
             kind,
@@ -239,7 +274,10 @@ impl World {
         case.check(plot::plot(&wanted, &Session::new(&NEVER, &reporter)), name);
         for page in [out, err] {
             let text = String::from_utf8(page.0.lock().unwrap().clone()).unwrap();
-            assert!(text.chars().all(|c| c == '\n' || !is_unseen(c)), "not harmless: {text:?}");
+            assert!(
+                text.chars().all(|c| c == '\n' || !is_unseen(c)),
+                "not harmless: {text:?}"
+            );
         }
     }
 }
@@ -255,9 +293,14 @@ fn scenario(world: &World, dice: &mut Dice, case: &mut Case) {
     let gone = || Error::unstable("scenario.json: nobody reads on".to_string());
     let row = |_| {
         rows += 1;
-        if rows < 50 && begin.elapsed() < PATIENCE { Ok(()) } else { Err(gone()) }
+        if rows < 50 && begin.elapsed() < PATIENCE {
+            Ok(())
+        } else {
+            Err(gone())
+        }
     };
-    let simulated = simulate(&scenario, false, row).map_err(|error| error.in_place("scenario.json"));
+    let simulated =
+        simulate(&scenario, false, row).map_err(|error| error.in_place("scenario.json"));
     case.check(simulated, "scenario.json");
 }
 
@@ -290,10 +333,14 @@ fn run(world: &World, dice: &mut Dice, case: &mut Case) {
         });
         done
     };
-    case.check(eval::eval(&options, &Session::new(&stop, &()).threads(Some(1))), "run.json");
+    case.check(
+        eval::eval(&options, &Session::new(&stop, &()).threads(Some(1))),
+        "run.json",
+    );
     drop(ended);
     world.plot(case, FigureKind::Archive, &archive, "run.json");
-    let substeps = run.config.protocol.control_steps as f64 * f64::from(run.config.physics.substeps);
+    let substeps =
+        run.config.protocol.control_steps as f64 * f64::from(run.config.physics.substeps);
     if substeps < 1e5 {
         world.plot(case, FigureKind::Spacetime, &archive, "run.json");
     }
@@ -309,7 +356,11 @@ fn run(world: &World, dice: &mut Dice, case: &mut Case) {
 fn config(world: &World, dice: &mut Dice, case: &mut Case) {
     let seed = std::str::from_utf8(&world.seeds["config"]).unwrap();
     let as_json = serde_json::to_value(toml::from_str::<toml::Value>(seed).unwrap()).unwrap();
-    let name = if dice.below(2) == 0 { "config.toml" } else { "config.json" };
+    let name = if dice.below(2) == 0 {
+        "config.toml"
+    } else {
+        "config.json"
+    };
     case.input = match dice.below(3) {
         0 => bytes(dice, seed.as_bytes()),
         _ => {
@@ -329,8 +380,18 @@ fn config(world: &World, dice: &mut Dice, case: &mut Case) {
 fn evaluation(world: &World, dice: &mut Dice, case: &mut Case) {
     case.input = world.json("eval", dice);
     let folder = world.with("eval.json", &case.input);
-    world.plot(case, FigureKind::Accuracy, &folder.join("eval.json"), "eval.json");
-    world.plot(case, FigureKind::Accuracy, &folder.join("run.json"), "eval.json");
+    world.plot(
+        case,
+        FigureKind::Accuracy,
+        &folder.join("eval.json"),
+        "eval.json",
+    );
+    world.plot(
+        case,
+        FigureKind::Accuracy,
+        &folder.join("run.json"),
+        "eval.json",
+    );
 }
 
 fn audit(world: &World, dice: &mut Dice, case: &mut Case) {
@@ -349,7 +410,12 @@ fn audit(world: &World, dice: &mut Dice, case: &mut Case) {
 fn capacity(world: &World, dice: &mut Dice, case: &mut Case) {
     case.input = world.json("capacity", dice);
     let folder = world.with("capacity.json", &case.input);
-    world.plot(case, FigureKind::Capacity, &folder.join("capacity.json"), "capacity.json");
+    world.plot(
+        case,
+        FigureKind::Capacity,
+        &folder.join("capacity.json"),
+        "capacity.json",
+    );
 }
 
 /// What a report shows of a team.
@@ -358,14 +424,22 @@ fn team(world: &World, dice: &mut Dice, case: &mut Case) {
     let folder = world.with("team.json", &case.input);
     if let Some(file) = case.check(TeamFile::read(&folder.join("team.json")), "team.json") {
         let (is_decided, has_robots) = (file.answers.is_some(), !file.members.is_empty());
-        assert_eq!((confusion(&file).is_some(), poster(&file).is_some()), (is_decided, has_robots));
+        assert_eq!(
+            (confusion(&file).is_some(), poster(&file).is_some()),
+            (is_decided, has_robots)
+        );
     }
 }
 
 fn metrics(world: &World, dice: &mut Dice, case: &mut Case) {
     case.input = bytes(dice, &world.seeds["metrics"]);
     let folder = world.with("metrics.csv", &case.input);
-    world.plot(case, FigureKind::Progress, &folder.join("run.json"), "metrics.csv");
+    world.plot(
+        case,
+        FigureKind::Progress,
+        &folder.join("run.json"),
+        "metrics.csv",
+    );
 }
 
 /// Goes on with a run from a wrong checkpoint, signed again or not.
@@ -388,10 +462,17 @@ fn checkpoint(world: &World, dice: &mut Dice, case: &mut Case) {
         out: folder.clone(),
         if_exists: IfExists::Resume,
     };
-    let resumed = evolve::evolve(&options, &Session::new(&AtomicBool::new(true), &()).threads(Some(1)));
+    let resumed = evolve::evolve(
+        &options,
+        &Session::new(&AtomicBool::new(true), &()).threads(Some(1)),
+    );
     // What is wrong with the run is told with its folder.
     if case.check(resumed, "hostile").is_none() {
-        assert_eq!(std::fs::read(folder.join("run.json")).unwrap(), before, "nothing is lost");
+        assert_eq!(
+            std::fs::read(folder.join("run.json")).unwrap(),
+            before,
+            "nothing is lost"
+        );
     } else {
         RunFile::read(&folder.join("run.json")).expect("a run that this program can have made");
     }
@@ -403,7 +484,9 @@ fn request(world: &World, dice: &mut Dice, case: &mut Case) {
     let (head, body) = seed.split_once("\r\n\r\n").unwrap();
     let mut body = body.as_bytes().to_vec();
     if dice.below(3) > 0 {
-        body = value(dice, &serde_json::from_slice(&body).unwrap()).to_string().into_bytes();
+        body = value(dice, &serde_json::from_slice(&body).unwrap())
+            .to_string()
+            .into_bytes();
     }
     let paths = [
         "rollouts",
@@ -415,7 +498,9 @@ fn request(world: &World, dice: &mut Dice, case: &mut Case) {
         "images?set=builtin&class=1",
     ];
     let mut head = head.replace("/api/simulations", &format!("/api/{}", dice.pick(&paths)));
-    head = head.replace("PORT", &world.port.to_string()).replace("LENGTH", &body.len().to_string());
+    head = head
+        .replace("PORT", &world.port.to_string())
+        .replace("LENGTH", &body.len().to_string());
     case.input = [head.as_bytes(), b"\r\n\r\n", &body].concat();
     if dice.below(2) == 0 {
         case.input = bytes(dice, &case.input);
@@ -428,7 +513,9 @@ fn ask(port: u16, case: &mut Case) {
     let mut stream = TcpStream::connect(("127.0.0.1", port)).unwrap();
     stream.set_read_timeout(Some(LIMIT)).unwrap();
     // What is refused early is not read to its end.
-    let _ = stream.write_all(&case.input).and_then(|()| stream.shutdown(Shutdown::Write));
+    let _ = stream
+        .write_all(&case.input)
+        .and_then(|()| stream.shutdown(Shutdown::Write));
     let mut answer = Vec::new();
     let _ = stream.take(4000).read_to_end(&mut answer);
     let text = String::from_utf8_lossy(&answer).into_owned();
@@ -436,12 +523,25 @@ fn ask(port: u16, case: &mut Case) {
     assert!(text.is_empty() || text.starts_with("HTTP/1.1 "), "{text:?}");
     let status = text.get(9..12).unwrap_or_default();
     assert!(
-        ["", "200", "204", "400", "403", "404", "405", "408", "411", "413", "431", "503"].contains(&status),
+        [
+            "", "200", "204", "400", "403", "404", "405", "408", "411", "413", "431", "503"
+        ]
+        .contains(&status),
         "{text}"
     );
-    if let Some((_, body)) = text.split_once("\r\n\r\n").filter(|_| status.starts_with('4')) {
-        assert_eq!(body.lines().count(), usize::from(!body.is_empty()), "one line: {body:?}");
-        assert!(body.chars().all(|c| c == '\n' || !is_unseen(c)), "not harmless: {body:?}");
+    if let Some((_, body)) = text
+        .split_once("\r\n\r\n")
+        .filter(|_| status.starts_with('4'))
+    {
+        assert_eq!(
+            body.lines().count(),
+            usize::from(!body.is_empty()),
+            "one line: {body:?}"
+        );
+        assert!(
+            body.chars().all(|c| c == '\n' || !is_unseen(c)),
+            "not harmless: {body:?}"
+        );
     }
 }
 
@@ -460,17 +560,23 @@ fn kept(name: &str, input: &[u8]) -> PathBuf {
 
 #[test]
 fn mutated_inputs_are_refused_or_used_and_nothing_else_ever_happens() {
-    let seconds = std::env::var("MORPHCOG_HOSTILE_SECONDS").ok().map(|text| text.parse::<f64>().unwrap());
+    let seconds = std::env::var("MORPHCOG_HOSTILE_SECONDS")
+        .ok()
+        .map(|text| text.parse::<f64>().unwrap());
     let only = std::env::var("MORPHCOG_HOSTILE_ONLY").ok();
     let world = World::new();
     let until = Instant::now() + Duration::from_secs_f64(seconds.unwrap_or(SECONDS));
-    let first: u64 = std::env::var("MORPHCOG_HOSTILE_FIRST").map_or(0, |text| text.parse().unwrap());
+    let first: u64 =
+        std::env::var("MORPHCOG_HOSTILE_FIRST").map_or(0, |text| text.parse().unwrap());
     // Panics of the program's threads count, too; those of other tests, whose threads have their names, do not.
     let usual = std::panic::take_hook();
     let own = std::thread::current().name().map(str::to_string);
     std::panic::set_hook(Box::new(move |about| {
         let thread = std::thread::current();
-        if thread.name().is_none_or(|name| !name.contains("::") || own.as_deref() == Some(name)) {
+        if thread
+            .name()
+            .is_none_or(|name| !name.contains("::") || own.as_deref() == Some(name))
+        {
             PANICS.fetch_add(1, Ordering::Relaxed);
         }
         usual(about);
@@ -488,8 +594,11 @@ fn mutated_inputs_are_refused_or_used_and_nothing_else_ever_happens() {
             }
         }
     });
-    let (mut counts, mut outcomes, mut slowest) =
-        ([0u64; TARGETS.len()], BTreeMap::<String, u64>::new(), Vec::new());
+    let (mut counts, mut outcomes, mut slowest) = (
+        [0u64; TARGETS.len()],
+        BTreeMap::<String, u64>::new(),
+        Vec::new(),
+    );
     let mut failures = Vec::new();
     for number in first.. {
         for (kind, (name, target)) in TARGETS.iter().enumerate() {
@@ -502,7 +611,11 @@ fn mutated_inputs_are_refused_or_used_and_nothing_else_ever_happens() {
             let mut case = Case::default();
             let simulated = catch_unwind(AssertUnwindSafe(|| {
                 target(&world, &mut Dice::new(kind, number), &mut case);
-                assert_eq!(PANICS.load(Ordering::Relaxed), 0, "a panic in another thread");
+                assert_eq!(
+                    PANICS.load(Ordering::Relaxed),
+                    0,
+                    "a panic in another thread"
+                );
             }));
             if simulated.is_err() {
                 failures.push(kept(&label, &case.input));
@@ -510,7 +623,12 @@ fn mutated_inputs_are_refused_or_used_and_nothing_else_ever_happens() {
             }
             counts[kind] += 1;
             slowest.push((begin.elapsed(), label, case.input.len()));
-            let outcome: String = case.outcome.chars().filter(|c| !c.is_ascii_digit()).take(80).collect();
+            let outcome: String = case
+                .outcome
+                .chars()
+                .filter(|c| !c.is_ascii_digit())
+                .take(80)
+                .collect();
             *outcomes.entry(format!("{name}: {outcome}")).or_default() += 1;
         }
         slowest.sort_by_key(|(time, ..)| std::cmp::Reverse(*time));
@@ -522,8 +640,12 @@ fn mutated_inputs_are_refused_or_used_and_nothing_else_ever_happens() {
     *AT_WORK.lock().unwrap() = None;
     if seconds.is_some() {
         println!("inputs: {counts:?} of {:?}", TARGETS.map(|(name, _)| name));
-        slowest.iter().for_each(|(time, label, size)| println!("{time:>10.1?}  {label} ({size} bytes)"));
-        outcomes.iter().for_each(|(outcome, count)| println!("{count:>8}  {outcome}"));
+        slowest
+            .iter()
+            .for_each(|(time, label, size)| println!("{time:>10.1?}  {label} ({size} bytes)"));
+        outcomes
+            .iter()
+            .for_each(|(outcome, count)| println!("{count:>8}  {outcome}"));
     }
     assert!(counts.iter().sum::<u64>() > 0);
     assert!(failures.is_empty(), "see {failures:#?}");
@@ -534,25 +656,44 @@ fn mutated_inputs_are_refused_or_used_and_nothing_else_ever_happens() {
 #[track_caller]
 fn put_to(sandbox: &Sandbox, args: &str, file: &str) -> Said {
     let said = said_of(sandbox.command(args.split_whitespace()), "", LIMIT);
-    assert!([Some(0), Some(3), Some(4)].contains(&said.code), "{args}: {said:#?}");
+    assert!(
+        [Some(0), Some(3), Some(4)].contains(&said.code),
+        "{args}: {said:#?}"
+    );
     for text in [&said.out, &said.err] {
-        assert!(text.chars().all(|c| c == '\n' || !is_unseen(c)), "{args}: not harmless: {text:?}");
-        assert!(text.lines().all(|line| !line.starts_with("error: forged")), "{args}: a forged line: {text}");
-        assert!(text.lines().all(|line| line.chars().count() < 4000), "{args}: overlong: {text}");
+        assert!(
+            text.chars().all(|c| c == '\n' || !is_unseen(c)),
+            "{args}: not harmless: {text:?}"
+        );
+        assert!(
+            text.lines().all(|line| !line.starts_with("error: forged")),
+            "{args}: a forged line: {text}"
+        );
+        assert!(
+            text.lines().all(|line| line.chars().count() < 4000),
+            "{args}: overlong: {text}"
+        );
     }
-    assert!(said.code != Some(3) || said.err.contains(file), "{args}: names no file: {said:#?}");
+    assert!(
+        said.code != Some(3) || said.err.contains(file),
+        "{args}: names no file: {said:#?}"
+    );
     said
 }
 
 #[test]
 fn the_worst_inputs_end_soon_in_every_command_that_reads_them() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus");
-    let mut files: Vec<PathBuf> =
-        std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let mut files: Vec<PathBuf> = std::fs::read_dir(&folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
     files.sort();
     let sandbox = Sandbox::new();
     sandbox.write("few.toml", FEW);
-    sandbox.run("evolve -q --config few.toml --out run").ended(0, &[]);
+    sandbox
+        .run("evolve -q --config few.toml --out run")
+        .ended(0, &[]);
     let server = server::Server::start(&sandbox, "--archive run/run.json");
     let mut kinds = BTreeMap::<String, usize>::new();
     for path in files {
@@ -564,29 +705,55 @@ fn the_worst_inputs_end_soon_in_every_command_that_reads_them() {
         match kind.as_str() {
             "scenario" => {
                 file("scenario.json");
-                put_to("simulate hostile/scenario.json --out hostile/rollout.csv", "scenario.json");
+                put_to(
+                    "simulate hostile/scenario.json --out hostile/rollout.csv",
+                    "scenario.json",
+                );
             }
             "run" => {
                 file("run.json");
-                put_to("eval --archive hostile/run.json --images 2 --cycles 1 --robots top:1", "run.json");
-                put_to("plot archive --archive hostile/run.json --dpi 36", "run.json");
-                put_to("plot spacetime --archive hostile/run.json --dpi 36", "run.json");
+                put_to(
+                    "eval --archive hostile/run.json --images 2 --cycles 1 --robots top:1",
+                    "run.json",
+                );
+                put_to(
+                    "plot archive --archive hostile/run.json --dpi 36",
+                    "run.json",
+                );
+                put_to(
+                    "plot spacetime --archive hostile/run.json --dpi 36",
+                    "run.json",
+                );
             }
             "eval" => {
                 file("eval.json");
-                put_to("plot accuracy --archive hostile/eval.json --dpi 36", "eval.json");
+                put_to(
+                    "plot accuracy --archive hostile/eval.json --dpi 36",
+                    "eval.json",
+                );
             }
             "request" => {
-                let text = String::from_utf8_lossy(&content).replace("PORT", &server.port.to_string());
-                let mut case = Case { input: text.into_bytes(), ..Case::default() };
+                let text =
+                    String::from_utf8_lossy(&content).replace("PORT", &server.port.to_string());
+                let mut case = Case {
+                    input: text.into_bytes(),
+                    ..Case::default()
+                };
                 ask(server.port, &mut case);
-                assert!(case.outcome.starts_with("HTTP/1.1 "), "{name}: {}", case.outcome);
+                assert!(
+                    case.outcome.starts_with("HTTP/1.1 "),
+                    "{name}: {}",
+                    case.outcome
+                );
             }
             _ => panic!("{name}: expected scenario-, run-, eval- or request-"),
         }
         *kinds.entry(kind).or_default() += 1;
     }
-    assert_eq!(kinds.keys().map(String::as_str).collect::<Vec<_>>(), ["eval", "request", "run", "scenario"]);
+    assert_eq!(
+        kinds.keys().map(String::as_str).collect::<Vec<_>>(),
+        ["eval", "request", "run", "scenario"]
+    );
     assert_eq!(server.get("/api/status").status, 200);
     #[cfg(unix)]
     server.ended_by("TERM");

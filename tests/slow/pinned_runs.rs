@@ -27,7 +27,11 @@ struct Way {
 
 /// The instruction sets of this machine, the fastest first.
 fn sets() -> Vec<InstructionSet> {
-    InstructionSet::ALL.into_iter().rev().filter(|set| set.is_available()).collect()
+    InstructionSet::ALL
+        .into_iter()
+        .rev()
+        .filter(|set| set.is_available())
+        .collect()
 }
 
 /// The fastest set and the next: the last, which every machine has, is many times slower.
@@ -44,7 +48,12 @@ fn hash(elites: &[Robot]) -> String {
         let displacements: Vec<u64> = elite.displacements.iter().map(|d| d.to_bits()).collect();
         let objective = elite.objective.to_bits();
         let digest = &elite.genome.digest()[..10];
-        writeln!(text, "{:?} {digest} {objective:016x} {displacements:016x?}", elite.cell).unwrap();
+        writeln!(
+            text,
+            "{:?} {digest} {objective:016x} {displacements:016x?}",
+            elite.cell
+        )
+        .unwrap();
     }
     sha256_hex(text.as_bytes())
 }
@@ -58,7 +67,13 @@ struct Made {
 }
 
 fn make(sandbox: &Sandbox, way: &Way) -> Made {
-    let switch = |bit: usize| format!("--set savings.{}={}", SAVINGS[bit], way.savings >> bit & 1 == 1);
+    let switch = |bit: usize| {
+        format!(
+            "--set savings.{}={}",
+            SAVINGS[bit],
+            way.savings >> bit & 1 == 1
+        )
+    };
     let switches = [0, 1, 2].map(switch).join(" ");
     let run = |threads: u32, more: &str| {
         let args = format!("evolve -q -c run.toml -o out --threads {threads} {switches} {more}");
@@ -74,7 +89,11 @@ fn make(sandbox: &Sandbox, way: &Way) -> Made {
         }
     }
     let metrics = without_seconds(&sandbox.read("out/metrics.csv"));
-    Made { run: sandbox.read("out/run.json"), metrics, elites: sandbox.run_file("out").elites }
+    Made {
+        run: sandbox.read("out/run.json"),
+        metrics,
+        elites: sandbox.run_file("out").elites,
+    }
 }
 
 /// The last line of `metrics.csv` by column; in every line the counts must add up.
@@ -84,12 +103,20 @@ fn totals(metrics: &[String], images: u64) -> BTreeMap<String, u64> {
     for row in rows.deserialize::<BTreeMap<String, String>>() {
         let row = row.unwrap();
         let number = |name: &str| row[name].parse::<u64>().unwrap();
-        assert_eq!(number("simulated") + number("saved"), number("evaluations") * images, "{row:?}");
+        assert_eq!(
+            number("simulated") + number("saved"),
+            number("evaluations") * images,
+            "{row:?}"
+        );
         let parts = SAVINGS.map(|saving| number(&format!("saved_{saving}")));
         assert_eq!(number("saved"), parts.iter().sum::<u64>(), "{row:?}");
         let names = ["evaluations", "simulated"].map(str::to_string);
         let saved = SAVINGS.map(|saving| format!("saved_{saving}"));
-        last = names.into_iter().chain(saved).map(|name| (name.clone(), number(&name))).collect();
+        last = names
+            .into_iter()
+            .chain(saved)
+            .map(|name| (name.clone(), number(&name)))
+            .collect();
     }
     assert!(last["evaluations"] > 0);
     last
@@ -103,33 +130,85 @@ fn check(config: &str, images: u64, effective: &[&str], pinned: &str) {
     let sandbox = Sandbox::new();
     sandbox.write("run.toml", config);
     let [fastest, next] = two_sets();
-    let plain = || Way { threads: 1, savings: ALL, set: fastest, stopped_after: None };
+    let plain = || Way {
+        threads: 1,
+        savings: ALL,
+        set: fastest,
+        stopped_after: None,
+    };
     let whole = make(&sandbox, &plain());
-    assert!(whole.elites.len() >= 4, "{} elites: too small a run to say anything", whole.elites.len());
-    assert_eq!(hash(&whole.elites), pinned, "see the beginning of this file");
+    assert!(
+        whole.elites.len() >= 4,
+        "{} elites: too small a run to say anything",
+        whole.elites.len()
+    );
+    assert_eq!(
+        hash(&whole.elites),
+        pinned,
+        "see the beginning of this file"
+    );
     // Where the savings are looked at one by one, so are the other ways.
     if !effective.is_empty() {
-        let resumed = Way { threads: 3, stopped_after: Some(5), set: next, ..plain() };
-        assert!(make(&sandbox, &resumed) == whole, "resumed, on 3 threads, {next:?}");
+        let resumed = Way {
+            threads: 3,
+            stopped_after: Some(5),
+            set: next,
+            ..plain()
+        };
+        assert!(
+            make(&sandbox, &resumed) == whole,
+            "resumed, on 3 threads, {next:?}"
+        );
     }
-    let other = Way { threads: 7, savings: NONE, set: next, stopped_after: Some(7) };
+    let other = Way {
+        threads: 7,
+        savings: NONE,
+        set: next,
+        stopped_after: Some(7),
+    };
     let unsaved = make(&sandbox, &other);
-    assert!(unsaved.elites == whole.elites, "no savings, resumed, on 7 threads, {next:?}");
-    let (none, all) = (totals(&unsaved.metrics, images), totals(&whole.metrics, images));
+    assert!(
+        unsaved.elites == whole.elites,
+        "no savings, resumed, on 7 threads, {next:?}"
+    );
+    let (none, all) = (
+        totals(&unsaved.metrics, images),
+        totals(&whole.metrics, images),
+    );
     assert!(all["evaluations"] == none["evaluations"] && all["simulated"] < none["simulated"]);
     // What an instability makes needless counts as stopped early.
     let saved = |counts: &BTreeMap<String, u64>, saving: &str| counts[&format!("saved_{saving}")];
     // A run of gaits never shows a body twice.
-    assert!(saved(&none, "known_bodies") == 0 || config.contains("response"), "{none:?}");
+    assert!(
+        saved(&none, "known_bodies") == 0 || config.contains("response"),
+        "{none:?}"
+    );
     assert_eq!(saved(&none, "shared_rollouts"), 0);
-    for (bit, saving) in SAVINGS.iter().enumerate().filter(|(_, saving)| effective.contains(saving)) {
-        let made = make(&sandbox, &Way { threads: 2, savings: 1 << bit, ..plain() });
+    for (bit, saving) in SAVINGS
+        .iter()
+        .enumerate()
+        .filter(|(_, saving)| effective.contains(saving))
+    {
+        let made = make(
+            &sandbox,
+            &Way {
+                threads: 2,
+                savings: 1 << bit,
+                ..plain()
+            },
+        );
         assert!(made.elites == whole.elites, "{saving} alone");
         let some = totals(&made.metrics, images);
         assert_eq!(some["evaluations"], none["evaluations"]);
-        assert!(some["simulated"] < none["simulated"], "{saving} alone: {some:?}");
+        assert!(
+            some["simulated"] < none["simulated"],
+            "{saving} alone: {some:?}"
+        );
         for name in SAVINGS {
-            assert!(name == "early_stop" || (saved(&some, name) > 0) == (name == *saving), "{some:?}");
+            assert!(
+                name == "early_stop" || (saved(&some, name) > 0) == (name == *saving),
+                "{some:?}"
+            );
         }
         assert!(saved(&some, saving) > 0, "{saving} alone: {some:?}");
     }
@@ -151,7 +230,17 @@ fn a_run_on_every_instruction_set() {
     sandbox.write("run.toml", TINY);
     let sets = sets();
     println!("instruction sets of this machine: {sets:?}");
-    let made = |set| make(&sandbox, &Way { threads: 2, savings: ALL, set, stopped_after: None });
+    let made = |set| {
+        make(
+            &sandbox,
+            &Way {
+                threads: 2,
+                savings: ALL,
+                set,
+                stopped_after: None,
+            },
+        )
+    };
     let first = made(sets[0]);
     assert!(first.elites.len() >= 4 && sets[1..].iter().all(|&set| made(set) == first));
 }
@@ -159,8 +248,16 @@ fn a_run_on_every_instruction_set() {
 #[test]
 fn two_groups() {
     // Long enough a rollout for robots that walk both ways: only a success can end a rollout early.
-    let config = tiny(&[("generations = 12", "generations = 30"), ("steps = 20", "steps = 50")]);
-    check(&config, 2, &SAVINGS, "1e4b7db220180aad0b06012c3b8d00084cad7e66aa940049e92f3d150737fd06");
+    let config = tiny(&[
+        ("generations = 12", "generations = 30"),
+        ("steps = 20", "steps = 50"),
+    ]);
+    check(
+        &config,
+        2,
+        &SAVINGS,
+        "1e4b7db220180aad0b06012c3b8d00084cad7e66aa940049e92f3d150737fd06",
+    );
 }
 
 #[test]
@@ -177,7 +274,12 @@ fn sequential_rollouts() {
 #[test]
 fn the_paper_s_protocol() {
     let config = tiny(&[SEQUENTIAL, ("control_steps = 20", "control_steps = 500")]);
-    check(&config, 2, &[], "38e9052e5c9f95a3bd20ccd9b52f8b46c803f55a0e0a28dce0adb9538d2ce672");
+    check(
+        &config,
+        2,
+        &[],
+        "38e9052e5c9f95a3bd20ccd9b52f8b46c803f55a0e0a28dce0adb9538d2ce672",
+    );
 }
 
 #[test]
@@ -196,7 +298,10 @@ fn all_splits() {
 fn splits_with_the_bin_for_the_same_way() {
     let config = tiny(&[
         ("generations = 12", "generations = 25"),
-        ("groups = [[0], [1]]", "splits = [3, 0, 7]\nsame_way_bin = true"),
+        (
+            "groups = [[0], [1]]",
+            "splits = [3, 0, 7]\nsame_way_bin = true",
+        ),
         ("train_images = [0, 1]", "train_images = [0, 3, 7]"),
     ]);
     check(
@@ -211,16 +316,27 @@ fn splits_with_the_bin_for_the_same_way() {
 fn sequential_rollouts_of_splits() {
     let config = tiny(&[
         SEQUENTIAL,
-        ("groups = [[0], [1]]", "splits = [0, 1, 2]\nsame_way_bin = true"),
+        (
+            "groups = [[0], [1]]",
+            "splits = [0, 1, 2]\nsame_way_bin = true",
+        ),
         ("train_images = [0, 1]", "train_images = [0, 1, 2]"),
     ]);
-    check(&config, 3, &[], "00922b09f85d215ad5fb5d3e369192ee1364982f06f2f3346c1f1dee048f457e");
+    check(
+        &config,
+        3,
+        &[],
+        "00922b09f85d215ad5fb5d3e369192ee1364982f06f2f3346c1f1dee048f457e",
+    );
 }
 
 #[test]
 fn splits_with_two_images_per_class() {
     let config = tiny(&[
-        ("groups = [[0], [1]]", "splits = [0, 1, 2]\nsame_way_bin = true"),
+        (
+            "groups = [[0], [1]]",
+            "splits = [0, 1, 2]\nsame_way_bin = true",
+        ),
         ("train_images = [0, 1]", "images_per_class = 2"),
     ]);
     check(
@@ -234,13 +350,26 @@ fn splits_with_two_images_per_class() {
 #[test]
 fn three_images_per_class() {
     let config = tiny(&[("train_images = [0, 1]", "images_per_class = 3")]);
-    check(&config, 6, &SAVINGS, "59f4c72dba846132a21f926af11a83cb9918e693f8923bcc3f3c4c5dabcc16b8");
+    check(
+        &config,
+        6,
+        &SAVINGS,
+        "59f4c72dba846132a21f926af11a83cb9918e693f8923bcc3f3c4c5dabcc16b8",
+    );
 }
 
 #[test]
 fn unequal_groups_of_drawn_images() {
-    let config = tiny(&[("train_images = [0, 1]", "images_per_class = 3"), ("[[0], [1]]", "[[0, 4], [1]]")]);
-    check(&config, 9, &[], "82bf757dcad76e179f39b216c9fabf4e5299f694b84a37e37e99f4b4da8bdcc3");
+    let config = tiny(&[
+        ("train_images = [0, 1]", "images_per_class = 3"),
+        ("[[0], [1]]", "[[0, 4], [1]]"),
+    ]);
+    check(
+        &config,
+        9,
+        &[],
+        "82bf757dcad76e179f39b216c9fabf4e5299f694b84a37e37e99f4b4da8bdcc3",
+    );
 }
 
 #[test]
@@ -248,7 +377,10 @@ fn unequal_groups_and_saturated_images() {
     let config = tiny(&[
         ("groups = [[0], [1]]", "groups = [[5], [1, 2]]"),
         ("train_images = [0, 1]", "train_images = [1, 5, 2, 12]"),
-        ("reduction = \"area\"", "reduction = \"area\"\nencoding = \"saturated\""),
+        (
+            "reduction = \"area\"",
+            "reduction = \"area\"\nencoding = \"saturated\"",
+        ),
     ]);
     check(
         &config,
@@ -261,7 +393,10 @@ fn unequal_groups_and_saturated_images() {
 #[test]
 fn thresholded_images_and_random_immigrants() {
     let config = tiny(&[
-        ("reduction = \"area\"", "reduction = \"area\"\nencoding = \"threshold\"\nlevel = 0.3"),
+        (
+            "reduction = \"area\"",
+            "reduction = \"area\"\nencoding = \"threshold\"\nlevel = 0.3",
+        ),
         ("parents = 8", "parents = 6\nrandom_immigrants = 3"),
     ]);
     check(
@@ -278,7 +413,9 @@ fn check_kept(config: &str) {
     let sandbox = Sandbox::new();
     let elites = |config: &str, options: &str| {
         sandbox.write("run.toml", config);
-        sandbox.run(&format!("evolve -q -c run.toml -o out --force {options}")).ended(0, &[]);
+        sandbox
+            .run(&format!("evolve -q -c run.toml -o out --force {options}"))
+            .ended(0, &[]);
         sandbox.run_file("out").elites
     };
     assert_eq!(elites(config, "").len(), 6);
@@ -295,26 +432,45 @@ fn check_kept(config: &str) {
 fn the_six_fittest() {
     let config = format!("{TINY}\n[archive]\nkeep = 6\n");
     check_kept(&config);
-    check(&config, 2, &[], "c10e43f3ae412bf220f1b0af6acfc547c44913d1008ab650810fed02cfc07123");
+    check(
+        &config,
+        2,
+        &[],
+        "c10e43f3ae412bf220f1b0af6acfc547c44913d1008ab650810fed02cfc07123",
+    );
 }
 
 #[test]
 fn the_six_fittest_gaits() {
     check_kept(&gaits());
-    check(&gaits(), 8, &[], "2294ed6c40f0ef8f35ebfec24a0262a478108f67c2c9dd1aaea820fb75aa856c");
+    check(
+        &gaits(),
+        8,
+        &[],
+        "2294ed6c40f0ef8f35ebfec24a0262a478108f67c2c9dd1aaea820fb75aa856c",
+    );
 }
 
 #[test]
 fn gaits_of_three_cycles() {
-    let config = gaits().replace("keep = 6", "").replace("control_steps = 20", "control_steps = 60");
-    check(&config, 8, &[], "022ad60ca44a221f7cbef1c2eeaa768aaa1d81c05e1e5c6441183ee600263045");
+    let config = gaits()
+        .replace("keep = 6", "")
+        .replace("control_steps = 20", "control_steps = 60");
+    check(
+        &config,
+        8,
+        &[],
+        "022ad60ca44a221f7cbef1c2eeaa768aaa1d81c05e1e5c6441183ee600263045",
+    );
 }
 
 #[test]
 fn another_seed_makes_another_run() {
     let sandbox = Sandbox::tiny();
     let result = |seed: u32| {
-        sandbox.run(&format!("evolve -q -c tiny.toml --seed {seed} -o {seed}")).ended(0, &[]);
+        sandbox
+            .run(&format!("evolve -q -c tiny.toml --seed {seed} -o {seed}"))
+            .ended(0, &[]);
         sandbox.run_file(&seed.to_string()).elites
     };
     assert_ne!(result(1), result(2));
@@ -332,12 +488,21 @@ fn check_command(run: &str, command: &str, files: &[&str]) {
         let mut command = sandbox.command(line.split(' '));
         command.env("MORPHCOG_ISA", set.name());
         let said = said(command).ended(0, &[]);
-        (said.out, files.iter().map(|file| std::fs::read(sandbox.path(file)).unwrap()).collect::<Vec<_>>())
+        (
+            said.out,
+            files
+                .iter()
+                .map(|file| std::fs::read(sandbox.path(file)).unwrap())
+                .collect::<Vec<_>>(),
+        )
     };
     let [fastest, next] = two_sets();
     let first = made(1, fastest);
     assert!(first.1.iter().all(|file| !file.is_empty()));
-    assert!(made(2, next) == first && made(3, fastest) == first, "1 to 3 threads, {fastest:?} and {next:?}");
+    assert!(
+        made(2, next) == first && made(3, fastest) == first,
+        "1 to 3 threads, {fastest:?} and {next:?}"
+    );
 }
 
 #[test]
@@ -355,7 +520,16 @@ fn an_audit() {
 #[test]
 fn a_response() {
     let response = "response -q -a run --robots best --task 3|14 -n 60 --error 0 -o response.json";
-    check_command(&gaits(), response, &["response.json", "response.csv", "response.svg", "response.png"]);
+    check_command(
+        &gaits(),
+        response,
+        &[
+            "response.json",
+            "response.csv",
+            "response.svg",
+            "response.png",
+        ],
+    );
 }
 
 #[test]
@@ -363,6 +537,11 @@ fn a_training() {
     let train = "train -q -a run --robots top:2 --task 0|1 -o taught --force --set train.random_images=40 \
                  --set train.rounds=2 --set train.images=24 --set train.final_images=20 --set \
                  train.challengers=6 --set validation.images=40 --set train.windows=50";
-    let files = ["taught/run.json", "taught/elites.csv", "taught/training.json", "taught/validation.json"];
+    let files = [
+        "taught/run.json",
+        "taught/elites.csv",
+        "taught/training.json",
+        "taught/validation.json",
+    ];
     check_command(TINY, train, &files);
 }

@@ -85,7 +85,9 @@ impl Material {
 
 /// A number that belongs to no material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0} is not a material; expected 0…6 (0 empty, 1 rigid, 2 soft, 3 and 4 muscle, 5 and 6 sensor)")]
+#[error(
+    "{0} is not a material; expected 0…6 (0 empty, 1 rigid, 2 soft, 3 and 4 muscle, 5 and 6 sensor)"
+)]
 pub struct UnknownMaterial(pub u8);
 
 impl TryFrom<u8> for Material {
@@ -108,8 +110,15 @@ pub const MAX_SIDE: usize = 64;
 /// a stimulus drives voxel (row, column). In files: rows of numbers 0…6 (see [`Material`]).
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(try_from = "Grid<Material>", into = "Grid<Material>"))]
-#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema), schemars(with = "Vec<Vec<Material>>"))]
+#[cfg_attr(
+    feature = "serde",
+    serde(try_from = "Grid<Material>", into = "Grid<Material>")
+)]
+#[cfg_attr(
+    feature = "schemars",
+    derive(schemars::JsonSchema),
+    schemars(with = "Vec<Vec<Material>>")
+)]
 pub struct Body(Grid<Material>);
 
 /// Numbers of voxels of a body, by kind.
@@ -140,7 +149,9 @@ pub enum BodyError {
         width: usize,
     },
     /// A character of the text form is not a digit 0…6.
-    #[error("row {row}, column {column}: '{found}' is not a voxel; expected a digit 0…6 (or '.' for empty)")]
+    #[error(
+        "row {row}, column {column}: '{found}' is not a voxel; expected a digit 0…6 (or '.' for empty)"
+    )]
     Voxel {
         /// Row from the top, from 0.
         row: usize,
@@ -227,7 +238,13 @@ impl Body {
     /// shows the effect of each of those places when its voxel grows.
     pub fn probe(&self) -> Self {
         let is_place = |material: Material| material == Material::Soft || material.is_sensor();
-        Body(self.0.map(|&material| if is_place(material) { Material::SensorExpand } else { material }))
+        Body(self.0.map(|&material| {
+            if is_place(material) {
+                Material::SensorExpand
+            } else {
+                material
+            }
+        }))
     }
 
     /// Returns the body mirrored left to right.
@@ -269,12 +286,14 @@ impl FromStr for Body {
         let mut rows = Vec::new();
         for (row, line) in text.trim().split(['\n', '/']).enumerate() {
             let cells = line.trim().chars().enumerate().map(|(column, found)| {
-                let digit = if found == '.' { Some(0) } else { found.to_digit(10) };
-                digit.and_then(|d| Material::from_code(d as u8)).ok_or(BodyError::Voxel {
-                    row,
-                    column,
-                    found,
-                })
+                let digit = if found == '.' {
+                    Some(0)
+                } else {
+                    found.to_digit(10)
+                };
+                digit
+                    .and_then(|d| Material::from_code(d as u8))
+                    .ok_or(BodyError::Voxel { row, column, found })
             });
             rows.push(cells.collect::<Result<Vec<_>, _>>()?);
         }
@@ -302,18 +321,36 @@ mod tests {
     fn json_is_a_list_of_rows_of_numbers() {
         let b = body("0123\n4560");
         assert_eq!(serde_json::to_string(&b).unwrap(), "[[0,1,2,3],[4,5,6,0]]");
-        assert_eq!(serde_json::from_str::<Body>("[[0,1,2,3],[4,5,6,0]]").unwrap(), b);
-        let error = serde_json::from_str::<Body>("[[0,7]]").unwrap_err().to_string();
+        assert_eq!(
+            serde_json::from_str::<Body>("[[0,1,2,3],[4,5,6,0]]").unwrap(),
+            b
+        );
+        let error = serde_json::from_str::<Body>("[[0,7]]")
+            .unwrap_err()
+            .to_string();
         assert!(error.contains('7') && error.contains("0…6"), "{error}");
     }
 
     #[test]
     fn what_is_not_a_body_is_refused_with_its_place() {
         let error = "012\n078".parse::<Body>().unwrap_err();
-        assert_eq!(error, BodyError::Voxel { row: 1, column: 1, found: '7' });
+        assert_eq!(
+            error,
+            BodyError::Voxel {
+                row: 1,
+                column: 1,
+                found: '7'
+            }
+        );
         assert!(matches!("01\n0".parse::<Body>(), Err(BodyError::Shape(_))));
         let row = "2".repeat(65);
-        assert!(matches!(row.parse::<Body>(), Err(BodyError::TooLarge { height: 1, width: 65 })));
+        assert!(matches!(
+            row.parse::<Body>(),
+            Err(BodyError::TooLarge {
+                height: 1,
+                width: 65
+            })
+        ));
     }
 
     #[test]
@@ -334,6 +371,13 @@ mod tests {
     #[test]
     fn voxels_are_counted_by_kind() {
         let b = body("0123456");
-        assert_eq!(b.counts(), VoxelCounts { muscle: 2, sensor: 2, total: 6 });
+        assert_eq!(
+            b.counts(),
+            VoxelCounts {
+                muscle: 2,
+                sensor: 2,
+                total: 6
+            }
+        );
     }
 }

@@ -13,7 +13,11 @@ use crate::system::System;
 
 /// Energies put into a robot \[mass·wu²/s²\].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(deny_unknown_fields)
+)]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 pub struct Energy {
     /// The actuators' share: they move the goals while the springs keep their lengths.
@@ -50,9 +54,16 @@ impl Meter {
     pub fn new(System { lattice, physics }: &System) -> Self {
         let half = physics.servo_gain / 2.0;
         // From a slot to the ends of its springs, by family.
-        let ends = [[0, 1], [0, lattice.pitch], [0, lattice.pitch + 1], [1, lattice.pitch]];
+        let ends = [
+            [0, 1],
+            [0, lattice.pitch],
+            [0, lattice.pitch + 1],
+            [1, lattice.pitch],
+        ];
         let mut springs = Vec::new();
-        for (slot, family) in (0..lattice.slots).flat_map(|slot| (0..FAMILIES).map(move |f| (slot, f))) {
+        for (slot, family) in
+            (0..lattice.slots).flat_map(|slot| (0..FAMILIES).map(move |f| (slot, f)))
+        {
             let index = spring_index(slot, family);
             if lattice.exists[index].to_bits() != 0 {
                 springs.push(Spring {
@@ -63,12 +74,18 @@ impl Meter {
                 });
             }
         }
-        springs.extend(lattice.off_lattice_springs.iter().enumerate().map(|(i, spring)| Spring {
-            ends: spring.ends,
-            half: half * spring.stiffness,
-            goal: Some(lattice.len + i),
-            length: spring.length,
-        }));
+        springs.extend(
+            lattice
+                .off_lattice_springs
+                .iter()
+                .enumerate()
+                .map(|(i, spring)| Spring {
+                    ends: spring.ends,
+                    half: half * spring.stiffness,
+                    goal: Some(lattice.len + i),
+                    length: spring.length,
+                }),
+        );
         Meter {
             springs,
             points: lattice.points.iter().map(|&(point, _)| point).collect(),
@@ -107,7 +124,10 @@ impl Meter {
         let elastic = |spring: &Spring| {
             let [a, b] = spring.ends;
             let (dx, dy) = (x[b] - x[a], y[b] - y[a]);
-            let goal = spring.goal.and_then(|index| self.goals.get(index)).unwrap_or(&spring.length);
+            let goal = spring
+                .goal
+                .and_then(|index| self.goals.get(index))
+                .unwrap_or(&spring.length);
             let excess = (dx * dx + dy * dy).sqrt() - goal;
             spring.half * excess * excess
         };
@@ -139,7 +159,11 @@ mod tests {
     fn muscles_give_energy_and_limits_only_where_they_are_reached() {
         let (driven, _) = simulated("344/044", Physics::default());
         assert!(driven.drive > 1.0 && driven.limits > 0.0, "{driven:?}");
-        let wide = Physics { limit_low: 0.0, limit_high: 9.0, ..Physics::default() };
+        let wide = Physics {
+            limit_low: 0.0,
+            limit_high: 9.0,
+            ..Physics::default()
+        };
         let (free, _) = simulated("344/044", wide);
         assert!(free.drive > 1.0 && free.limits.abs() < 1e-6, "{free:?}");
     }
@@ -153,7 +177,10 @@ mod tests {
         world.step().unwrap();
         let expected = 2.0 * 0.5 * physics.active_stiffness * physics.servo_gain * 0.01 * 0.01;
         let drive = world.energy().drive;
-        assert!((drive - expected).abs() < 1e-6 * expected, "{drive}, expected {expected}");
+        assert!(
+            (drive - expected).abs() < 1e-6 * expected,
+            "{drive}, expected {expected}"
+        );
     }
 
     #[test]

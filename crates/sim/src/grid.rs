@@ -7,7 +7,10 @@ use std::ops::{Index, IndexMut};
 /// In files it is a list of rows of equal length.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
-#[cfg_attr(feature = "serde", serde(into = "Vec<Vec<T>>", bound(serialize = "T: Clone + serde::Serialize")))]
+#[cfg_attr(
+    feature = "serde",
+    serde(into = "Vec<Vec<T>>", bound(serialize = "T: Clone + serde::Serialize"))
+)]
 pub struct Grid<T> {
     height: usize,
     width: usize,
@@ -50,15 +53,29 @@ impl<T> Grid<T> {
         }
         if let Some((row, cells)) = rows.iter().enumerate().find(|(_, r)| r.len() != width) {
             let found = cells.len();
-            return Err(GridError::Ragged { row, found, expected: width });
+            return Err(GridError::Ragged {
+                row,
+                found,
+                expected: width,
+            });
         }
-        Ok(Grid { height, width, cells: rows.into_iter().flatten().collect() })
+        Ok(Grid {
+            height,
+            width,
+            cells: rows.into_iter().flatten().collect(),
+        })
     }
 
     /// Makes a grid whose cell (row, column) is `cell(row, column)`.
     pub fn from_fn(height: usize, width: usize, mut cell: impl FnMut(usize, usize) -> T) -> Self {
-        let cells = (0..height * width).map(|i| cell(i / width, i % width)).collect();
-        Grid { height, width, cells }
+        let cells = (0..height * width)
+            .map(|i| cell(i / width, i % width))
+            .collect();
+        Grid {
+            height,
+            width,
+            cells,
+        }
     }
 
     /// Returns the number of rows.
@@ -89,7 +106,10 @@ impl<T> Grid<T> {
 
     /// Iterates over all cells with their row and column, in row-major order.
     pub fn iter(&self) -> impl Iterator<Item = ((usize, usize), &T)> {
-        self.cells.iter().enumerate().map(|(i, t)| ((i / self.width, i % self.width), t))
+        self.cells
+            .iter()
+            .enumerate()
+            .map(|(i, t)| ((i / self.width, i % self.width), t))
     }
 
     /// Iterates over the rows, top row first.
@@ -99,26 +119,38 @@ impl<T> Grid<T> {
 
     /// Applies `f` to every cell.
     pub fn map<U>(&self, f: impl FnMut(&T) -> U) -> Grid<U> {
-        Grid { height: self.height, width: self.width, cells: self.cells.iter().map(f).collect() }
+        Grid {
+            height: self.height,
+            width: self.width,
+            cells: self.cells.iter().map(f).collect(),
+        }
     }
 }
 
 impl<T: Copy + Default> Grid<T> {
     /// Returns the cell at (row, column), or the default (a dark pixel) outside the grid.
     pub fn or_default(&self, (row, column): (usize, usize)) -> T {
-        self.get(row as isize, column as isize).copied().unwrap_or_default()
+        self.get(row as isize, column as isize)
+            .copied()
+            .unwrap_or_default()
     }
 }
 
 impl<T: Clone> Grid<T> {
     /// Makes a grid with the same value in every cell.
     pub fn filled(height: usize, width: usize, value: T) -> Self {
-        Grid { height, width, cells: vec![value; height * width] }
+        Grid {
+            height,
+            width,
+            cells: vec![value; height * width],
+        }
     }
 
     /// Returns the grid mirrored left to right.
     pub fn mirrored(&self) -> Self {
-        Grid::from_fn(self.height, self.width, |r, c| self[(r, self.width - 1 - c)].clone())
+        Grid::from_fn(self.height, self.width, |r, c| {
+            self[(r, self.width - 1 - c)].clone()
+        })
     }
 }
 
@@ -173,7 +205,11 @@ mod reading {
                     width = found;
                 }
                 if found != width {
-                    return Err(A::Error::custom(GridError::Ragged { row: height, found, expected: width }));
+                    return Err(A::Error::custom(GridError::Ragged {
+                        row: height,
+                        found,
+                        expected: width,
+                    }));
                 }
                 if found == 0 {
                     return Err(A::Error::custom(GridError::Empty));
@@ -183,7 +219,11 @@ mod reading {
             if height == 0 {
                 return Err(A::Error::custom(GridError::Empty));
             }
-            Ok(Grid { height, width, cells })
+            Ok(Grid {
+                height,
+                width,
+                cells,
+            })
         }
     }
 
@@ -224,9 +264,19 @@ mod tests {
     #[test]
     fn rows_of_different_length_are_refused_with_their_place() {
         let error = Grid::from_rows(vec![vec![1, 2], vec![3]]).unwrap_err();
-        assert_eq!(error, GridError::Ragged { row: 1, found: 1, expected: 2 });
+        assert_eq!(
+            error,
+            GridError::Ragged {
+                row: 1,
+                found: 1,
+                expected: 2
+            }
+        );
         assert_eq!(Grid::<u8>::from_rows(vec![]).unwrap_err(), GridError::Empty);
-        assert_eq!(Grid::<u8>::from_rows(vec![vec![]]).unwrap_err(), GridError::Empty);
+        assert_eq!(
+            Grid::<u8>::from_rows(vec![vec![]]).unwrap_err(),
+            GridError::Empty
+        );
     }
 
     #[test]
@@ -245,23 +295,34 @@ mod tests {
         let grid = Grid::from_fn(2, 2, |r, c| (r, c));
         let text = serde_json::to_string(&grid).unwrap();
         assert_eq!(text, "[[[0,0],[0,1]],[[1,0],[1,1]]]");
-        assert_eq!(serde_json::from_str::<Grid<(usize, usize)>>(&text).unwrap(), grid);
+        assert_eq!(
+            serde_json::from_str::<Grid<(usize, usize)>>(&text).unwrap(),
+            grid
+        );
     }
 
     #[cfg(feature = "serde")]
     #[test]
     fn rows_in_files_are_checked_as_others_and_rows_without_end_are_refused() {
-        let error = |text: &str| serde_json::from_str::<Grid<u8>>(text).unwrap_err().to_string();
+        let error = |text: &str| {
+            serde_json::from_str::<Grid<u8>>(text)
+                .unwrap_err()
+                .to_string()
+        };
         assert!(error("[[1,2],[3]]").contains("row 1 has 1 cells, expected 2"));
         assert!(error("[[1],[3,4]]").contains("row 1 has 2 cells, expected 1"));
         for empty in ["[]", "[[]]", "[[],[]]"] {
             assert!(error(empty).contains("found none"), "{empty}");
         }
         assert!(error("[[1],[300]]").contains("300") && error("7").contains("a list of rows"));
-        for endless in
-            [format!("[{}", "[0],".repeat(MOST_CELLS + 1)), format!("[[{}", "0,".repeat(MOST_CELLS + 1))]
-        {
-            assert!(error(&endless).contains("at most 1048576 cells"), "before its end");
+        for endless in [
+            format!("[{}", "[0],".repeat(MOST_CELLS + 1)),
+            format!("[[{}", "0,".repeat(MOST_CELLS + 1)),
+        ] {
+            assert!(
+                error(&endless).contains("at most 1048576 cells"),
+                "before its end"
+            );
         }
     }
 }

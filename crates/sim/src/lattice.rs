@@ -167,14 +167,20 @@ impl Lattice {
             self.set_spring(2, [tl, br], side * ratio, false);
             self.set_spring(3, [tr, bl], side * ratio, false);
             if material == Material::Rigid {
-                self.rigid_links.extend(SIDES.map(|(a, b)| [corners[a], corners[b]]));
+                self.rigid_links
+                    .extend(SIDES.map(|(a, b)| [corners[a], corners[b]]));
             }
         }
     }
 
     fn set_spring(&mut self, family: usize, ends: [usize; 2], stiffness: f64, keep: bool) {
         // Offsets from the slot to the spring's first and second point.
-        let (from, to) = [(0, 1), (0, self.pitch), (0, self.pitch + 1), (1, self.pitch)][family];
+        let (from, to) = [
+            (0, 1),
+            (0, self.pitch),
+            (0, self.pitch + 1),
+            (1, self.pitch),
+        ][family];
         let slot = ends[0].wrapping_sub(from);
         if slot < self.lattice_slots && ends[0] < self.lattice_slots && ends[1] == slot + to {
             let index = spring_index(slot, family);
@@ -184,7 +190,11 @@ impl Lattice {
             self.exists[index] = f64::from_bits(u64::MAX >> 1);
             return;
         }
-        match self.off_lattice_springs.iter_mut().find(|spring| spring.ends == ends) {
+        match self
+            .off_lattice_springs
+            .iter_mut()
+            .find(|spring| spring.ends == ends)
+        {
             Some(spring) if !keep => spring.stiffness = stiffness,
             Some(_) => {}
             None => self.off_lattice_springs.push(OffLatticeSpring {
@@ -230,12 +240,18 @@ impl Lattice {
             let voxel = self.active.len();
             self.active.push(ActiveVoxel { material, place });
             for ends in [[tl, tr], [bl, br]] {
-                let off_lattice = self.off_lattice_springs.iter().position(|spring| spring.ends == ends);
+                let off_lattice = self
+                    .off_lattice_springs
+                    .iter()
+                    .position(|spring| spring.ends == ends);
                 let goal = off_lattice.map_or(ends[0], |index| self.len + index);
                 owner.entry(goal).or_insert([voxel, voxel])[1] = voxel;
             }
         }
-        self.actuated = owner.into_iter().map(|(goal, voxels)| ActuatedSide { goal, voxels }).collect();
+        self.actuated = owner
+            .into_iter()
+            .map(|(goal, voxels)| ActuatedSide { goal, voxels })
+            .collect();
     }
 }
 
@@ -248,46 +264,69 @@ struct NumberedVoxels {
 
 /// Numbers the points of all voxels.
 fn numbered_voxels(body: &Body) -> NumberedVoxels {
-    let filled: Vec<_> = body.voxels().iter().filter(|(_, m)| !m.is_empty()).map(|(p, _)| p).collect();
+    let filled: Vec<_> = body
+        .voxels()
+        .iter()
+        .filter(|(_, m)| !m.is_empty())
+        .map(|(p, _)| p)
+        .collect();
     let least = |f: fn(&(usize, usize)) -> usize| filled.iter().map(f).min().unwrap_or(0);
     let most = |f: fn(&(usize, usize)) -> usize| filled.iter().map(f).max().unwrap_or(0);
     let (top, left) = (least(|p| p.0), least(|p| p.1));
     let (width, height) = (most(|p| p.1) - left + 2, most(|p| p.0) - top + 2);
     // Whole blocks per row are faster to work on, unless they add many slots.
     let padded = width.next_multiple_of(BLOCK);
-    let pitch = if 4 * padded <= 5 * width { padded } else { width };
+    let pitch = if 4 * padded <= 5 * width {
+        padded
+    } else {
+        width
+    };
     let lattice_slots = height * pitch;
     let mut len = lattice_slots;
     let mut off_lattice = Grid::filled(body.height() + 1, body.width() + 1, None);
     let mut list = Vec::with_capacity(filled.len());
     for (row, column) in filled {
-        let corner = |down: usize, right: usize, off_lattice: &mut Grid<Option<usize>>, len: &mut usize| {
-            let (r, c) = (row + down, column + right);
-            let at = |dr: isize, dc: isize| !body.at(r as isize + dr, c as isize + dc).is_empty();
-            let falling = at(-1, -1) && at(0, 0) && !at(-1, 0) && !at(0, -1);
-            let rising = at(-1, 0) && at(0, -1) && !at(-1, -1) && !at(0, 0);
-            // If two voxels touch only here, the later one has the vertex as a top corner.
-            if (falling || rising) && down == 0 {
-                *off_lattice[(r, c)].get_or_insert_with(|| {
-                    *len += 1;
-                    *len - 1
-                })
-            } else {
-                (r - top) * pitch + (c - left)
-            }
-        };
+        let corner =
+            |down: usize, right: usize, off_lattice: &mut Grid<Option<usize>>, len: &mut usize| {
+                let (r, c) = (row + down, column + right);
+                let at =
+                    |dr: isize, dc: isize| !body.at(r as isize + dr, c as isize + dc).is_empty();
+                let falling = at(-1, -1) && at(0, 0) && !at(-1, 0) && !at(0, -1);
+                let rising = at(-1, 0) && at(0, -1) && !at(-1, -1) && !at(0, 0);
+                // If two voxels touch only here, the later one has the vertex as a top corner.
+                if (falling || rising) && down == 0 {
+                    *off_lattice[(r, c)].get_or_insert_with(|| {
+                        *len += 1;
+                        *len - 1
+                    })
+                } else {
+                    (r - top) * pitch + (c - left)
+                }
+            };
         let mut number = |down, right| corner(down, right, &mut off_lattice, &mut len);
         let corners = [number(0, 0), number(0, 1), number(1, 1), number(1, 0)];
         list.push(((row, column), corners));
     }
-    NumberedVoxels { list, pitch, lattice_slots, slots: len.next_multiple_of(BLOCK) }
+    NumberedVoxels {
+        list,
+        pitch,
+        lattice_slots,
+        slots: len.next_multiple_of(BLOCK),
+    }
 }
 
 fn surface_voxels(body: &Body, voxels: &[((usize, usize), [usize; 4])]) -> Vec<SurfaceVoxel> {
     let voxel = |&((row, column), corners): &((usize, usize), [usize; 4])| {
-        let exposed =
-            ACROSS.map(|(down, right)| body.at(row as isize + down, column as isize + right).is_empty());
-        exposed.contains(&true).then_some(SurfaceVoxel { row, column, corners, exposed })
+        let exposed = ACROSS.map(|(down, right)| {
+            body.at(row as isize + down, column as isize + right)
+                .is_empty()
+        });
+        exposed.contains(&true).then_some(SurfaceVoxel {
+            row,
+            column,
+            corners,
+            exposed,
+        })
     };
     voxels.iter().filter_map(voxel).collect()
 }
@@ -321,7 +360,11 @@ mod tests {
         assert_ne!(rounds, links);
         for point in 0..16 {
             let at = |links: &[[usize; 2]]| {
-                links.iter().filter(|link| link.contains(&point)).copied().collect::<Vec<_>>()
+                links
+                    .iter()
+                    .filter(|link| link.contains(&point))
+                    .copied()
+                    .collect::<Vec<_>>()
             };
             assert_eq!(at(&rounds), at(&links));
         }

@@ -232,32 +232,89 @@ impl Physics {
         ];
         let check = |list: &[(&'static str, f64)], good: fn(f64) -> bool, expected| {
             let bad = list.iter().find(|(_, v)| !v.is_finite() || !good(*v));
-            bad.map_or(Ok(()), |&(name, value)| Err(PhysicsError { name, value, expected }))
+            bad.map_or(Ok(()), |&(name, value)| {
+                Err(PhysicsError {
+                    name,
+                    value,
+                    expected,
+                })
+            })
         };
         check(&positive, |v| v > 0.0, "a finite number above 0")?;
         check(&not_negative, |v| v >= 0.0, "a finite number, 0 or above")?;
         check(&finite, |_| true, "a finite number")?;
         let counts = [
-            ("substeps", self.substeps, 1..=MOST_SUBSTEPS, "a whole number from 1 to 1000"),
-            ("cycle_steps", self.cycle_steps, 2..=MOST_CYCLE_STEPS, "a whole number from 2 to 100000"),
-            ("ground_row", self.ground_row, 1..=MOST_ROWS, "a whole number from 1 to 1000000"),
-            ("peg_spacing", self.peg_spacing, 1..=u32::MAX, "a whole number from 1"),
+            (
+                "substeps",
+                self.substeps,
+                1..=MOST_SUBSTEPS,
+                "a whole number from 1 to 1000",
+            ),
+            (
+                "cycle_steps",
+                self.cycle_steps,
+                2..=MOST_CYCLE_STEPS,
+                "a whole number from 2 to 100000",
+            ),
+            (
+                "ground_row",
+                self.ground_row,
+                1..=MOST_ROWS,
+                "a whole number from 1 to 1000000",
+            ),
+            (
+                "peg_spacing",
+                self.peg_spacing,
+                1..=u32::MAX,
+                "a whole number from 1",
+            ),
         ];
-        let bad = counts.iter().find(|(_, count, range, _)| !range.contains(count));
+        let bad = counts
+            .iter()
+            .find(|(_, count, range, _)| !range.contains(count));
         bad.map_or(Ok(()), |(name, count, _, expected)| {
-            Err(PhysicsError { name, value: f64::from(*count), expected })
+            Err(PhysicsError {
+                name,
+                value: f64::from(*count),
+                expected,
+            })
         })?;
         if self.blow_up_extent > f64::from(MOST_CELLS) * self.cell_size {
             let expected = "at most 1000 times cell_size";
-            return Err(PhysicsError { name: "blow_up_extent", value: self.blow_up_extent, expected });
+            return Err(PhysicsError {
+                name: "blow_up_extent",
+                value: self.blow_up_extent,
+                expected,
+            });
         }
         let ordered = [
-            ("target_max", self.target_max, self.target_min, "a number not below target_min"),
-            ("limit_high", self.limit_high, self.limit_low, "a number not below limit_low"),
-            ("rigid_limit_high", self.rigid_limit_high, self.rigid_limit_low, "not below rigid_limit_low"),
+            (
+                "target_max",
+                self.target_max,
+                self.target_min,
+                "a number not below target_min",
+            ),
+            (
+                "limit_high",
+                self.limit_high,
+                self.limit_low,
+                "a number not below limit_low",
+            ),
+            (
+                "rigid_limit_high",
+                self.rigid_limit_high,
+                self.rigid_limit_low,
+                "not below rigid_limit_low",
+            ),
         ];
         let bad = ordered.iter().find(|(_, high, low, _)| high < low);
-        bad.map_or(Ok(()), |&(name, value, _, expected)| Err(PhysicsError { name, value, expected }))
+        bad.map_or(Ok(()), |&(name, value, _, expected)| {
+            Err(PhysicsError {
+                name,
+                value,
+                expected,
+            })
+        })
     }
 }
 

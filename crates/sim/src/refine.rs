@@ -17,7 +17,11 @@ use crate::physics::Physics;
 
 /// Returns the fraction to remove in each of `by` passes so that together they remove `share`.
 fn spread_out(share: f64, by: f64) -> f64 {
-    if share < 1.0 { 1.0 - libm::pow(1.0 - share, 1.0 / by) } else { share }
+    if share < 1.0 {
+        1.0 - libm::pow(1.0 - share, 1.0 / by)
+    } else {
+        share
+    }
 }
 
 impl Physics {
@@ -78,10 +82,22 @@ mod tests {
             let fine = coarse.refined(n);
             fine.validate().unwrap();
             let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-12, "{a} {b}");
-            near(fine.active_stiffness * fine.servo_gain, coarse.active_stiffness * coarse.servo_gain);
-            near(fine.soft_stiffness * fine.time_step, coarse.soft_stiffness * coarse.time_step);
-            near(fine.time_step * f64::from(fine.substeps), coarse.time_step * f64::from(coarse.substeps));
-            near(libm::pow(1.0 - fine.limit_share, f64::from(n)), 1.0 - coarse.limit_share);
+            near(
+                fine.active_stiffness * fine.servo_gain,
+                coarse.active_stiffness * coarse.servo_gain,
+            );
+            near(
+                fine.soft_stiffness * fine.time_step,
+                coarse.soft_stiffness * coarse.time_step,
+            );
+            near(
+                fine.time_step * f64::from(fine.substeps),
+                coarse.time_step * f64::from(coarse.substeps),
+            );
+            near(
+                libm::pow(1.0 - fine.limit_share, f64::from(n)),
+                1.0 - coarse.limit_share,
+            );
         }
         assert_eq!(coarse.refined(1), coarse);
     }
@@ -90,14 +106,20 @@ mod tests {
     fn the_walk_of_a_plain_walker_converges_with_the_time_step() {
         let body = "444422/444422/333311/330011".parse().unwrap();
         let walk = |physics: &Physics| {
-            let mut world = World::new(System::new(&body, physics.clone()), Start { column: 0, row: 2 });
+            let mut world = World::new(
+                System::new(&body, physics.clone()),
+                Start { column: 0, row: 2 },
+            );
             let start = world.centre_of_mass()[0];
             (0..250).for_each(|_| world.step().unwrap());
             10.0 * (world.centre_of_mass()[0] - start)
         };
         let coarse = Physics::default();
         let walks = [1, 2, 4, 8].map(|n| walk(&coarse.refined(n)));
-        assert!(walks.iter().all(|d| (d / walks[3] - 1.0).abs() < 0.05), "{walks:?}");
+        assert!(
+            walks.iter().all(|d| (d / walks[3] - 1.0).abs() < 0.05),
+            "{walks:?}"
+        );
         // Dividing only the gain is not enough: the material then softens with the time step.
         let softened = Physics {
             rigid_stiffness: coarse.rigid_stiffness,
@@ -106,6 +128,9 @@ mod tests {
             ..coarse.refined(4)
         };
         let softened = walk(&softened);
-        assert!((softened / walks[3] - 1.0).abs() > 0.2, "{softened} beside {walks:?}");
+        assert!(
+            (softened / walks[3] - 1.0).abs() > 0.2,
+            "{softened} beside {walks:?}"
+        );
     }
 }

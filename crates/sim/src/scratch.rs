@@ -50,10 +50,19 @@ pub(crate) struct Scratch {
 impl Scratch {
     pub fn new(System { lattice, physics }: &System, state: &State) -> Self {
         let horizontal = (0..lattice.len).map(|_| physics.cell_size);
-        let off_lattice = lattice.off_lattice_springs.iter().map(|spring| spring.length);
+        let off_lattice = lattice
+            .off_lattice_springs
+            .iter()
+            .map(|spring| spring.length);
         let padding = [physics.cell_size; GROUP];
         let zeros = [[0.0; BLOCK]; 2];
-        let work = Work { pulls: Pulls::ZERO, load: zeros, first: zeros, second: zeros, third: zeros };
+        let work = Work {
+            pulls: Pulls::ZERO,
+            load: zeros,
+            first: zeros,
+            second: zeros,
+            third: zeros,
+        };
         // Slots without a point stay parked.
         let parked = || state.position.clone();
         Scratch {

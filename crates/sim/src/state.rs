@@ -53,10 +53,16 @@ impl State {
         for &(point, (row, column)) in &lattice.points {
             // Computed from integer grid indices, so that coincident points have the same bits.
             position[X][point] = column as f64 * physics.cell_size;
-            position[Y][point] = (start_row as usize + lattice.body_rows - row) as f64 * physics.cell_size;
+            position[Y][point] =
+                (start_row as usize + lattice.body_rows - row) as f64 * physics.cell_size;
         }
         let velocity = pair(lattice.len);
-        State { previous: position.clone(), position, velocity, control_step: 0 }
+        State {
+            previous: position.clone(),
+            position,
+            velocity,
+            control_step: 0,
+        }
     }
 
     /// Returns true if both have the same number of slots.

@@ -17,5 +17,9 @@ pub struct Stopped;
 /// Returns [`Stopped`] if the flag is set.
 #[inline(always)]
 pub fn check(stop: &AtomicBool) -> Result<(), Stopped> {
-    if stop.load(Ordering::Relaxed) { Err(Stopped) } else { Ok(()) }
+    if stop.load(Ordering::Relaxed) {
+        Err(Stopped)
+    } else {
+        Ok(())
+    }
 }

@@ -25,7 +25,10 @@ impl System {
     /// `cycle_steps` or `peg_spacing` is 0, if `target_min` is above `target_max`, or if one of
     /// these two is NaN. It may with others.
     pub fn new(body: &Body, physics: Physics) -> Self {
-        System { lattice: Lattice::new(body, &physics), physics }
+        System {
+            lattice: Lattice::new(body, &physics),
+            physics,
+        }
     }
 
     /// Returns the constants.

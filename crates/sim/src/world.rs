@@ -80,7 +80,9 @@ impl World {
 
     /// Returns the energies put in so far, over all resets; 0 without a meter.
     pub fn energy(&self) -> Energy {
-        self.meter.as_ref().map_or_else(Energy::default, |meter| meter.energy)
+        self.meter
+            .as_ref()
+            .map_or_else(Energy::default, |meter| meter.energy)
     }
 
     /// Returns to the start; the stimulus stays.
@@ -111,30 +113,71 @@ impl World {
     /// Returns a [`StepError`] if it was stopped, or if the simulation became unstable.
     pub fn step_unless(&mut self, stop: &AtomicBool) -> Result<(), StepError> {
         self.begin_step();
-        let World { system, start, state, scratch, meter, .. } = self;
+        let World {
+            system,
+            start,
+            state,
+            scratch,
+            meter,
+            ..
+        } = self;
         let control_step = state.control_step;
         let (system, meter, start_column) = (&**system, meter.as_mut(), start.column);
-        let steps = ControlStep { system, start_column, state, scratch, meter, stop };
+        let steps = ControlStep {
+            system,
+            start_column,
+            state,
+            scratch,
+            meter,
+            stop,
+        };
         match dispatch(self.instructions, steps) {
             Ok(()) => Ok(self.end_step()?),
             Err(Ended::Stopped) => Err(Stopped.into()),
-            Err(Ended::Unstable(reason)) => Err(Unstable { control_step, reason }.into()),
+            Err(Ended::Unstable(reason)) => Err(Unstable {
+                control_step,
+                reason,
+            }
+            .into()),
         }
     }
 
     /// Prepares the substeps of a control step.
     pub(crate) fn begin_step(&mut self) {
-        let World { system, state, scratch, pixels, targets, meter, .. } = self;
+        let World {
+            system,
+            state,
+            scratch,
+            pixels,
+            targets,
+            meter,
+            ..
+        } = self;
         scratch.begin();
-        actuation::set_goals(system, state.control_step, pixels, targets, &mut scratch.goals);
-        meter.iter_mut().for_each(|meter| meter.drive(&scratch.goals, &state.position));
+        actuation::set_goals(
+            system,
+            state.control_step,
+            pixels,
+            targets,
+            &mut scratch.goals,
+        );
+        meter
+            .iter_mut()
+            .for_each(|meter| meter.drive(&scratch.goals, &state.position));
     }
 
     /// Completes a control step. Every substep checks the one before, so the last is checked here.
     pub(crate) fn end_step(&mut self) -> Result<(), Unstable> {
         let control_step = self.state.control_step;
-        if !self.centre_of_mass().iter().all(|coordinate| coordinate.is_finite()) {
-            return Err(Unstable { control_step, reason: UnstableReason::BlownUp });
+        if !self
+            .centre_of_mass()
+            .iter()
+            .all(|coordinate| coordinate.is_finite())
+        {
+            return Err(Unstable {
+                control_step,
+                reason: UnstableReason::BlownUp,
+            });
         }
         self.state.control_step += 1;
         Ok(())
@@ -157,7 +200,11 @@ impl World {
     /// Returns all points [x, y] (as [`World::centre_of_mass`]), in EvoGym's order of creation.
     pub fn points(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
         let [x, y] = &self.state.position;
-        self.system.lattice.points.iter().map(|&(point, _)| [x[point], y[point]])
+        self.system
+            .lattice
+            .points
+            .iter()
+            .map(|&(point, _)| [x[point], y[point]])
     }
 
     /// Returns every non-empty voxel's (row, column) and its corners (top left, top right, bottom
@@ -165,8 +212,15 @@ impl World {
     pub fn voxels(&self) -> impl Iterator<Item = ((usize, usize), [usize; 4])> + '_ {
         let lattice = &self.system.lattice;
         let mut order = vec![0; lattice.len];
-        lattice.points.iter().enumerate().for_each(|(i, &(point, _))| order[point] = i);
-        lattice.voxels.iter().map(move |&(place, corners)| (place, corners.map(|c| order[c])))
+        lattice
+            .points
+            .iter()
+            .enumerate()
+            .for_each(|(i, &(point, _))| order[point] = i);
+        lattice
+            .voxels
+            .iter()
+            .map(move |&(place, corners)| (place, corners.map(|c| order[c])))
     }
 
     /// Returns the state, from which the simulation can continue later.

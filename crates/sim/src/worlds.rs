@@ -37,13 +37,19 @@ impl Worlds {
         let first = World::new(system, start);
         let count = count.clamp(1, Worlds::MOST);
         let rigid = SharedRigidPass::new(&first.system.lattice);
-        Worlds { worlds: vec![first; count], ended: vec![None; count], rigid }
+        Worlds {
+            worlds: vec![first; count],
+            ended: vec![None; count],
+            rigid,
+        }
     }
 
     /// Selects an instruction set instead of the widest.
     #[must_use]
     pub fn with_instructions(mut self, set: crate::InstructionSet) -> Self {
-        self.worlds.iter_mut().for_each(|world| world.instructions = set);
+        self.worlds
+            .iter_mut()
+            .for_each(|world| world.instructions = set);
         self
     }
 
@@ -73,12 +79,24 @@ impl Worlds {
     /// # Errors
     /// Returns [`Stopped`] if it was stopped; the states are then useless.
     pub fn step_unless(&mut self, stop: &AtomicBool) -> Result<(), Stopped> {
-        let Worlds { worlds, ended, rigid } = self;
+        let Worlds {
+            worlds,
+            ended,
+            rigid,
+        } = self;
         let (system, instructions) = (Arc::clone(&worlds[0].system), worlds[0].instructions);
-        let mut living: Vec<(&mut World, &mut Option<Unstable>)> =
-            worlds.iter_mut().zip(ended).filter(|(_, ended)| ended.is_none()).collect();
+        let mut living: Vec<(&mut World, &mut Option<Unstable>)> = worlds
+            .iter_mut()
+            .zip(ended)
+            .filter(|(_, ended)| ended.is_none())
+            .collect();
         living.iter_mut().for_each(|(world, _)| world.begin_step());
-        let steps = SideBySide { system: &system, worlds: &mut living, rigid, stop };
+        let steps = SideBySide {
+            system: &system,
+            worlds: &mut living,
+            rigid,
+            stop,
+        };
         match dispatch(instructions, steps) {
             Ok(()) => {}
             Err(Ended::Stopped | Ended::Unstable(_)) => return Err(Stopped),
@@ -103,19 +121,33 @@ impl Kernel for SideBySide<'_, '_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
-        let SideBySide { system, worlds, rigid, stop } = self;
+        let SideBySide {
+            system,
+            worlds,
+            rigid,
+            stop,
+        } = self;
         for _ in 0..system.physics.substeps {
             check(stop).map_err(|Stopped| Ended::Stopped)?;
             for (world, ended) in worlds.iter_mut().filter(|(_, ended)| ended.is_none()) {
-                let World { start, state, scratch, meter, .. } = &mut **world;
+                let World {
+                    start,
+                    state,
+                    scratch,
+                    meter,
+                    ..
+                } = &mut **world;
                 let done = before_rigid::<L>(system, start.column, state, scratch, meter.as_mut());
-                **ended = done
-                    .err()
-                    .map(|reason: UnstableReason| Unstable { control_step: state.control_step, reason });
+                **ended = done.err().map(|reason: UnstableReason| Unstable {
+                    control_step: state.control_step,
+                    reason,
+                });
             }
             let living = || worlds.iter().filter(|(_, ended)| ended.is_none()).count();
             if rigid.is_worth_it(living()) {
-                let positions = worlds.iter_mut().map(|(world, _)| &mut world.state.position);
+                let positions = worlds
+                    .iter_mut()
+                    .map(|(world, _)| &mut world.state.position);
                 rigid.limit::<L>(system, positions);
             } else {
                 let living = worlds.iter_mut().filter(|(_, ended)| ended.is_none());
@@ -123,7 +155,9 @@ impl Kernel for SideBySide<'_, '_> {
             }
             for (world, _) in worlds.iter_mut() {
                 let World { state, meter, .. } = &mut **world;
-                meter.iter_mut().for_each(|meter| meter.after_limits(&state.position));
+                meter
+                    .iter_mut()
+                    .for_each(|meter| meter.after_limits(&state.position));
             }
         }
         Ok(())
@@ -140,7 +174,9 @@ mod tests {
     const SOFT: &str = "22322/26251/42231";
 
     fn stimulus(number: usize) -> Grid<f64> {
-        Grid::from_fn(5, 7, |row, column| f64::from(u8::from((row * 3 + column + number).is_multiple_of(3))))
+        Grid::from_fn(5, 7, |row, column| {
+            f64::from(u8::from((row * 3 + column + number).is_multiple_of(3)))
+        })
     }
 
     #[test]
@@ -156,9 +192,13 @@ mod tests {
             };
             let alone: Vec<World> = (0..Worlds::MOST).map(alone).collect();
             assert_ne!(alone[0].state(), alone[1].state(), "what they see differs");
-            for set in InstructionSet::ALL.into_iter().filter(|set| set.is_available()) {
+            for set in InstructionSet::ALL
+                .into_iter()
+                .filter(|set| set.is_available())
+            {
                 for count in [1, 2, 5, 8] {
-                    let mut worlds = Worlds::new(Arc::clone(&system), start, count).with_instructions(set);
+                    let mut worlds =
+                        Worlds::new(Arc::clone(&system), start, count).with_instructions(set);
                     (0..count).for_each(|number| worlds.set_stimulus(number, &stimulus(number)));
                     (0..120).for_each(|_| worlds.step());
                     for (number, world) in worlds.all().iter().enumerate() {
@@ -176,10 +216,15 @@ mod tests {
     #[test]
     fn one_that_becomes_unstable_ends_as_by_itself_and_the_others_go_on() {
         // A voxel as wide as its goal blows up at once: those under a bright pixel.
-        let physics = Physics { blow_up_extent: 0.115, ..Physics::default() };
+        let physics = Physics {
+            blow_up_extent: 0.115,
+            ..Physics::default()
+        };
         let system = Arc::new(System::new(&"626/111".parse().unwrap(), physics));
         let start = Start { column: 0, row: 2 };
-        let bright = |number: usize| Grid::from_fn(2, 3, move |_, _| if number % 2 == 1 { 1.0 } else { 0.3 });
+        let bright = |number: usize| {
+            Grid::from_fn(2, 3, move |_, _| if number % 2 == 1 { 1.0 } else { 0.3 })
+        };
         let mut worlds = Worlds::new(Arc::clone(&system), start, 6);
         (0..6).for_each(|number| worlds.set_stimulus(number, &bright(number)));
         (0..60).for_each(|_| worlds.step());

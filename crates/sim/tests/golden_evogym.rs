@@ -12,7 +12,10 @@ const TOLERANCE: f64 = 1e-7;
 #[test]
 fn every_reference_agrees_at_every_control_step_and_stored_point() {
     let physics = Physics::default();
-    for reference in references().iter().filter(|reference| reference.unstable_at < 0) {
+    for reference in references()
+        .iter()
+        .filter(|reference| reference.unstable_at < 0)
+    {
         let mut world = reference.world(&physics);
         assert_eq!(reference.com.len() as u64, reference.control_steps + 1);
         let mut worst = compare(&world, reference);
@@ -20,8 +23,16 @@ fn every_reference_agrees_at_every_control_step_and_stored_point() {
             world.step().unwrap();
             worst = worst.max(compare(&world, reference));
         }
-        println!("{:14} differs by at most {:.1e} voxel lengths", reference.name, worst * 10.0);
-        assert!(worst <= TOLERANCE, "{}: {worst:e} world units", reference.name);
+        println!(
+            "{:14} differs by at most {:.1e} voxel lengths",
+            reference.name,
+            worst * 10.0
+        );
+        assert!(
+            worst <= TOLERANCE,
+            "{}: {worst:e} world units",
+            reference.name
+        );
     }
 }
 
@@ -30,7 +41,9 @@ fn compare(world: &World, reference: &Reference) -> f64 {
     let step = world.control_step();
     let offset = reference.start_column as f64 * 0.1;
     let difference = |ours: [f64; 2], theirs: [f64; 2]| {
-        (ours[0] + offset - theirs[0]).abs().max((ours[1] - theirs[1]).abs())
+        (ours[0] + offset - theirs[0])
+            .abs()
+            .max((ours[1] - theirs[1]).abs())
     };
     let mut worst = difference(world.centre_of_mass(), reference.com[step as usize]);
     if let Some(points) = reference.points.get(&step) {
@@ -61,7 +74,11 @@ fn sensitive_simulations_agree_within_three_times_the_spread_of_evogym_itself() 
             reference.name
         );
         assert_eq!(world.control_step(), reference.control_steps);
-        assert!(worst <= 3.0 * spread, "{}: {worst:e} voxel lengths, EvoGym {spread:e}", reference.name);
+        assert!(
+            worst <= 3.0 * spread,
+            "{}: {worst:e} voxel lengths, EvoGym {spread:e}",
+            reference.name
+        );
     }
 }
 

@@ -13,10 +13,14 @@ fn a_control_step_allocates_nothing() {
     let physics = Physics::default();
     for reference in references() {
         let mut world = reference.world(&physics);
-        if (0..WARM_UP.min(reference.control_steps)).try_for_each(|_| world.step()).is_err() {
+        if (0..WARM_UP.min(reference.control_steps))
+            .try_for_each(|_| world.step())
+            .is_err()
+        {
             continue;
         }
-        let info = allocation_counter::measure(|| (0..100).for_each(|_| world.step().unwrap_or(())));
+        let info =
+            allocation_counter::measure(|| (0..100).for_each(|_| world.step().unwrap_or(())));
         assert_eq!(info.count_total, 0, "{}: {info:?}", reference.name);
     }
 }

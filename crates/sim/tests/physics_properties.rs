@@ -17,8 +17,12 @@ fn bodies(kinds: &'static [Material], side: usize) -> impl Strategy<Value = Body
 
 fn stimuli(body: Body) -> impl Strategy<Value = (Body, Grid<f64>)> {
     let (height, width) = (body.height(), body.width());
-    prop::collection::vec(0.0..=1.0, height * width)
-        .prop_map(move |pixels| (body.clone(), Grid::from_fn(height, width, |r, c| pixels[r * width + c])))
+    prop::collection::vec(0.0..=1.0, height * width).prop_map(move |pixels| {
+        (
+            body.clone(),
+            Grid::from_fn(height, width, |r, c| pixels[r * width + c]),
+        )
+    })
 }
 
 /// A simulation: centre of mass before and after each control step.
@@ -57,7 +61,10 @@ fn symmetric_bodies() -> impl Strategy<Value = Body> {
                     let around = [(r - 1, c - 1), (r - 1, c), (r, c - 1), (r, c)];
                     let [a, b, d, e] = around.map(|(r, c)| empty(&voxels, r, c));
                     if a == e && b == d && a != b {
-                        let gap = around.into_iter().find(|&(r, c)| empty(&voxels, r, c)).unwrap();
+                        let gap = around
+                            .into_iter()
+                            .find(|&(r, c)| empty(&voxels, r, c))
+                            .unwrap();
                         voxels[gap] = Material::SensorExpand;
                     }
                 }
@@ -75,7 +82,9 @@ fn voxels(body: &Body, stimulus: &Grid<f64>) -> Vec<(usize, usize, Material, f64
     let list = || body.voxels().iter().filter(|(_, m)| !m.is_empty());
     let left = list().map(|((_, c), _)| c).min().unwrap_or(0);
     let seen = |place, m: &Material| if m.is_sensor() { stimulus[place] } else { 0.0 };
-    list().map(|((r, c), m)| (r, c - left, *m, seen((r, c), m))).collect()
+    list()
+        .map(|((r, c), m)| (r, c - left, *m, seen((r, c), m)))
+        .collect()
 }
 
 const ACTIVE_OR_EMPTY: &[Material] = &[
@@ -169,9 +178,19 @@ proptest! {
 
 #[test]
 fn a_large_body_of_every_material_stays_stable() {
-    let body = Body::new(Grid::from_fn(28, 28, |r, c| Material::ALL[(r * 5 + c * 3) % 6 + 1])).unwrap();
+    let body = Body::new(Grid::from_fn(28, 28, |r, c| {
+        Material::ALL[(r * 5 + c * 3) % 6 + 1]
+    }))
+    .unwrap();
     let stimulus = Grid::from_fn(28, 28, |r, c| f64::from(u8::from((r + c) % 2 == 0)));
-    let path = simulate(&body, &stimulus, Start { column: 0, row: 2 }, 20, &Physics::default()).unwrap();
+    let path = simulate(
+        &body,
+        &stimulus,
+        Start { column: 0, row: 2 },
+        20,
+        &Physics::default(),
+    )
+    .unwrap();
     assert!(path.iter().flatten().all(|v| v.is_finite()));
 }
 
@@ -179,5 +198,14 @@ fn a_large_body_of_every_material_stays_stable() {
 fn an_empty_body_does_not_panic() {
     let body = Body::new(Grid::filled(3, 3, Material::Empty)).unwrap();
     let stimulus = Grid::filled(3, 3, 1.0);
-    assert!(simulate(&body, &stimulus, Start { column: 0, row: 2 }, 5, &Physics::default()).is_ok());
+    assert!(
+        simulate(
+            &body,
+            &stimulus,
+            Start { column: 0, row: 2 },
+            5,
+            &Physics::default()
+        )
+        .is_ok()
+    );
 }

@@ -22,7 +22,13 @@ struct Line<'c> {
 impl<'c> Line<'c> {
     fn new(console: &'c Console, total: u64) -> Self {
         let moving = console.moving_line(total);
-        Line { console, total, begin: Instant::now(), moving, pacer: Mutex::default() }
+        Line {
+            console,
+            total,
+            begin: Instant::now(),
+            moving,
+            pacer: Mutex::default(),
+        }
     }
 
     /// Displays the text, which depends on the seconds since the beginning.
@@ -62,7 +68,10 @@ pub(crate) struct Bar<'c> {
 
 impl<'c> Bar<'c> {
     pub(super) fn new(console: &'c Console, total: u64) -> Self {
-        Bar { recent: Mutex::new(None), line: Line::new(console, total) }
+        Bar {
+            recent: Mutex::new(None),
+            line: Line::new(console, total),
+        }
     }
 
     /// Displays the progress (JSON: an event `generation`). The first call counts as the beginning:
@@ -122,8 +131,20 @@ impl<'c> Counter<'c> {
             count_line(label, [before, done, total], unit, seconds)
         });
         let is_json = self.line.console.mode() == Mode::Json;
-        if is_json && self.line.is_due(done, self.line.begin.elapsed().as_secs_f64()) {
-            self.line.console.event("progress", &Count { label, done, total, unit });
+        if is_json
+            && self
+                .line
+                .is_due(done, self.line.begin.elapsed().as_secs_f64())
+        {
+            self.line.console.event(
+                "progress",
+                &Count {
+                    label,
+                    done,
+                    total,
+                    unit,
+                },
+            );
         }
     }
 }
@@ -141,7 +162,11 @@ impl<'c> Live<'c> {
 
     /// Displays a picture in place of the previous one.
     pub(crate) fn show(&mut self, picture: &str) {
-        let up = if self.height > 0 { format!("\x1b[{}F", self.height) } else { String::new() };
+        let up = if self.height > 0 {
+            format!("\x1b[{}F", self.height)
+        } else {
+            String::new()
+        };
         self.height = picture.lines().count();
         self.console.out(&format!("{up}{picture}\n"));
     }
@@ -152,18 +177,41 @@ mod tests {
     use super::*;
     use crate::cli::output::console::tests::console;
 
-    const PROGRESS: Generation =
-        Generation { done: 0, total: 100, best: Some(1.0), coverage: 0.5, evaluations: 0 };
+    const PROGRESS: Generation = Generation {
+        done: 0,
+        total: 100,
+        best: Some(1.0),
+        coverage: 0.5,
+        evaluations: 0,
+    };
 
     #[test]
     fn without_a_terminal_progress_is_a_line_every_tenth() {
         let (console, out, err) = console(Mode::Human);
         let bar = console.progress(100);
-        (0..=100).for_each(|done| bar.update(&Generation { done, evaluations: 20 * done, ..PROGRESS }));
+        (0..=100).for_each(|done| {
+            bar.update(&Generation {
+                done,
+                evaluations: 20 * done,
+                ..PROGRESS
+            })
+        });
         let text = err.read();
-        assert_eq!((text.lines().count(), out.read().as_str()), (11, ""), "{text}");
-        assert!(text.starts_with("generation 0/100 · best 1.00 · coverage 50.0 %"), "{text}");
-        assert!(text.lines().last().unwrap().starts_with("generation 100/100"));
+        assert_eq!(
+            (text.lines().count(), out.read().as_str()),
+            (11, ""),
+            "{text}"
+        );
+        assert!(
+            text.starts_with("generation 0/100 · best 1.00 · coverage 50.0 %"),
+            "{text}"
+        );
+        assert!(
+            text.lines()
+                .last()
+                .unwrap()
+                .starts_with("generation 100/100")
+        );
     }
 
     #[test]
@@ -172,7 +220,10 @@ mod tests {
             let (console, out, err) = console(mode);
             let bar = console.progress(100);
             (1..=5).for_each(|done| bar.update(&Generation { done, ..PROGRESS }));
-            assert_eq!((out.read().lines().count(), err.read().as_str()), (lines, ""));
+            assert_eq!(
+                (out.read().lines().count(), err.read().as_str()),
+                (lines, "")
+            );
         }
     }
 
@@ -184,8 +235,11 @@ mod tests {
         let (json, out, _) = console(Mode::Json);
         let counter = json.counter("fetch", 2000, "bytes");
         (1..=2000).for_each(|done| counter.update(done));
-        let lines: Vec<serde_json::Value> =
-            out.read().lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+        let lines: Vec<serde_json::Value> = out
+            .read()
+            .lines()
+            .map(|l| serde_json::from_str(l).unwrap())
+            .collect();
         assert!((11..=12).contains(&lines.len()), "{lines:?}");
         assert_eq!(lines[lines.len() - 1]["done"], 2000);
     }

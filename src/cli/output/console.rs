@@ -59,7 +59,9 @@ struct Streams {
 
 /// Returns the number of columns of the terminal.
 fn columns() -> usize {
-    let told = crossterm::terminal::size().ok().map(|(columns, _)| usize::from(columns));
+    let told = crossterm::terminal::size()
+        .ok()
+        .map(|(columns, _)| usize::from(columns));
     told.filter(|columns| *columns > 0).unwrap_or(USUAL)
 }
 
@@ -84,8 +86,17 @@ impl Console {
     }
 
     /// Creates a console on any two writers, treated as files: no colours, no moving lines.
-    pub fn with_writers(mode: Mode, out: Box<dyn Write + Send>, err: Box<dyn Write + Send>) -> Self {
-        let streams = Mutex::new(Streams { out, err, closed: false, lost: false });
+    pub fn with_writers(
+        mode: Mode,
+        out: Box<dyn Write + Send>,
+        err: Box<dyn Write + Send>,
+    ) -> Self {
+        let streams = Mutex::new(Streams {
+            out,
+            err,
+            closed: false,
+            lost: false,
+        });
         Console {
             mode,
             terminals: [false; 2],
@@ -98,7 +109,11 @@ impl Console {
 
     /// Returns the current columns of stdout (0) or stderr (1), unlimited if it is no terminal.
     fn columns(&self, stream: usize) -> usize {
-        if self.narrow[stream] { columns() } else { usize::MAX }
+        if self.narrow[stream] {
+            columns()
+        } else {
+            usize::MAX
+        }
     }
 
     /// Returns the mode.
@@ -143,7 +158,13 @@ impl Console {
     /// Writes a line about a file, such as "wrote walk.gif" (JSON: with its path under `file`).
     pub(crate) fn line_about(&self, file: &Path, text: &str) {
         match self.mode {
-            Mode::Json => self.event("result", &Text { text, file: Some(file.display().to_string()) }),
+            Mode::Json => self.event(
+                "result",
+                &Text {
+                    text,
+                    file: Some(file.display().to_string()),
+                },
+            ),
             _ => self.line(text),
         }
     }
@@ -164,9 +185,11 @@ impl Console {
         match self.mode {
             Mode::Json => self.event("table", &Table { headers, rows }),
             _ => {
-                let headers: Vec<String> = headers.iter().map(|text| shortened(text, CELL)).collect();
+                let headers: Vec<String> =
+                    headers.iter().map(|text| shortened(text, CELL)).collect();
                 let headers: Vec<&str> = headers.iter().map(String::as_str).collect();
-                let cells = |row: &Vec<String>| row.iter().map(|text| shortened(text, CELL)).collect();
+                let cells =
+                    |row: &Vec<String>| row.iter().map(|text| shortened(text, CELL)).collect();
                 let rows: Vec<Vec<String>> = rows.iter().map(cells).collect();
                 self.out(&lines(table::fitted(&headers, &rows, self.columns(0))));
             }
@@ -179,7 +202,8 @@ impl Console {
         if self.mode != Mode::Json {
             return;
         }
-        let (Ok(name), Ok(payload)) = (serde_json::to_string(name), serde_json::to_string(payload)) else {
+        let (Ok(name), Ok(payload)) = (serde_json::to_string(name), serde_json::to_string(payload))
+        else {
             return self.warning(&format!("the event {name:?} cannot be written as JSON"));
         };
         let fields = match payload.strip_prefix('{') {
@@ -234,7 +258,10 @@ impl Console {
         while let Some(cause) = source {
             let words = cause.to_string();
             if !told.contains(&words) {
-                text += &lines(wrapped(&format!("  caused by: {}", one_line(&words)), self.columns(1)));
+                text += &lines(wrapped(
+                    &format!("  caused by: {}", one_line(&words)),
+                    self.columns(1),
+                ));
                 told = words.clone();
                 causes.push(words);
             }
@@ -252,9 +279,17 @@ impl Console {
 
     /// Writes a usage message, plain or coloured, to stderr.
     pub(crate) fn usage(&self, plain: &str, coloured: &str) {
-        let text = if self.terminals[1] && self.colour { coloured } else { plain };
+        let text = if self.terminals[1] && self.colour {
+            coloured
+        } else {
+            plain
+        };
         let columns = self.columns(1);
-        self.err(&lines(text.lines().flat_map(|line| wrapped(line, columns)).collect()));
+        self.err(&lines(
+            text.lines()
+                .flat_map(|line| wrapped(line, columns))
+                .collect(),
+        ));
     }
 
     /// Creates the progress of an evolution: call [`Bar::update`] after every generation.
@@ -275,7 +310,10 @@ impl Console {
 
     /// Formats a text behind a coloured word.
     fn painted(&self, word: &str, code: &str, text: &str) -> String {
-        let text = lines(wrapped(&format!("{word} {}", one_line(text)), self.columns(1)));
+        let text = lines(wrapped(
+            &format!("{word} {}", one_line(text)),
+            self.columns(1),
+        ));
         match self.terminals[1] && self.colour {
             true => text.replacen(word, &format!("\x1b[{code}m{word}\x1b[0m"), 1),
             false => text,
@@ -287,21 +325,32 @@ impl Console {
             if streams.closed {
                 return None;
             }
-            let result = streams.out.write_all(text.as_bytes()).and_then(|()| streams.out.flush());
+            let result = streams
+                .out
+                .write_all(text.as_bytes())
+                .and_then(|()| streams.out.flush());
             streams.closed = result.is_err();
-            let lost = result.err().filter(|e| e.kind() != io::ErrorKind::BrokenPipe);
+            let lost = result
+                .err()
+                .filter(|e| e.kind() != io::ErrorKind::BrokenPipe);
             streams.lost |= lost.is_some();
             lost
         });
         if let Some(e) = failure {
-            self.warning(&format!("results can no longer be written to the standard output: {e}"));
+            self.warning(&format!(
+                "results can no longer be written to the standard output: {e}"
+            ));
         }
     }
 
     pub(super) fn err(&self, text: &str) {
         // If stderr is closed, nobody reads the error.
-        let _ =
-            self.aside(|streams| streams.err.write_all(text.as_bytes()).and_then(|()| streams.err.flush()));
+        let _ = self.aside(|streams| {
+            streams
+                .err
+                .write_all(text.as_bytes())
+                .and_then(|()| streams.err.flush())
+        });
     }
 
     /// Writes while the progress line is suspended.
@@ -319,8 +368,13 @@ impl Console {
         if self.mode != Mode::Human || !self.terminals[1] {
             return None;
         }
-        let line = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(10));
-        let bar = if self.colour { "{bar:8.cyan/dim}" } else { "{bar:8}" };
+        let line =
+            ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(10));
+        let bar = if self.colour {
+            "{bar:8.cyan/dim}"
+        } else {
+            "{bar:8}"
+        };
         // The template is fixed; if it were wrong, the default would apply.
         if let Ok(style) = ProgressStyle::with_template(&format!("{bar} {{wide_msg}}")) {
             line.set_style(style.progress_chars("━━─"));
@@ -350,7 +404,11 @@ fn lines(lines: Vec<String>) -> String {
 fn in_json(c: char) -> String {
     let mut units = [0; 2];
     match is_unseen(c) {
-        true => c.encode_utf16(&mut units).iter().map(|unit| format!("\\u{unit:04x}")).collect(),
+        true => c
+            .encode_utf16(&mut units)
+            .iter()
+            .map(|unit| format!("\\u{unit:04x}"))
+            .collect(),
         false => c.to_string(),
     }
 }
@@ -396,7 +454,11 @@ pub(super) mod tests {
 
     pub(crate) fn console(mode: Mode) -> (Console, Page, Page) {
         let (out, err) = (Page::default(), Page::default());
-        (Console::with_writers(mode, Box::new(out.clone()), Box::new(err.clone())), out, err)
+        (
+            Console::with_writers(mode, Box::new(out.clone()), Box::new(err.clone())),
+            out,
+            err,
+        )
     }
 
     #[derive(Debug, thiserror::Error)]
@@ -430,7 +492,10 @@ pub(super) mod tests {
         console.line("result");
         console.info("note");
         console.warning("careful");
-        assert_eq!((out.read().as_str(), err.read().as_str()), ("result\n", "warning: careful\n"));
+        assert_eq!(
+            (out.read().as_str(), err.read().as_str()),
+            ("result\n", "warning: careful\n")
+        );
     }
 
     #[test]
@@ -438,7 +503,13 @@ pub(super) mod tests {
         let (console, out, _) = console(Mode::Json);
         console.event(
             "generation",
-            &Generation { done: 3, total: 9, best: None, coverage: 0.5, evaluations: 60 },
+            &Generation {
+                done: 3,
+                total: 9,
+                best: None,
+                coverage: 0.5,
+                evaluations: 60,
+            },
         );
         console.event("list", &[1, 2]);
         console.event("done", &serde_json::json!({}));
@@ -449,13 +520,37 @@ pub(super) mod tests {
         console.info("note");
         console.error(&Inner, None);
         let text = out.read();
-        assert!(text.starts_with("{\"event\":\"generation\",\"generation\":3,"), "{text}");
-        let lines: Vec<serde_json::Value> = text.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+        assert!(
+            text.starts_with("{\"event\":\"generation\",\"generation\":3,"),
+            "{text}"
+        );
+        let lines: Vec<serde_json::Value> = text
+            .lines()
+            .map(|l| serde_json::from_str(l).unwrap())
+            .collect();
         let events: Vec<&str> = lines.iter().map(|l| l["event"].as_str().unwrap()).collect();
-        assert_eq!(events, ["generation", "list", "done", "result", "result", "table", "info", "error"]);
-        assert_eq!((&lines[1]["value"][1], &lines[3]["text"]), (&2.into(), &"a\nb".into()));
+        assert_eq!(
+            events,
+            [
+                "generation",
+                "list",
+                "done",
+                "result",
+                "result",
+                "table",
+                "info",
+                "error"
+            ]
+        );
+        assert_eq!(
+            (&lines[1]["value"][1], &lines[3]["text"]),
+            (&2.into(), &"a\nb".into())
+        );
         assert_eq!(lines[3].get("file"), None);
-        assert_eq!((&lines[4]["text"], &lines[4]["file"]), (&"wrote walk.gif".into(), &"walk.gif".into()));
+        assert_eq!(
+            (&lines[4]["text"], &lines[4]["file"]),
+            (&"wrote walk.gif".into(), &"walk.gif".into())
+        );
     }
 
     #[test]
@@ -466,21 +561,44 @@ pub(super) mod tests {
             console.line(evil);
             console.info(evil);
             console.warning(evil);
-            console.error(&crate::base::error::Error::input(evil.to_string()), Some(evil));
+            console.error(
+                &crate::base::error::Error::input(evil.to_string()),
+                Some(evil),
+            );
             console.error(&std::io::Error::other(evil), None);
-            console.table(&["robot", evil], &[vec![evil.to_string(), "x".repeat(100_000)]]);
-            console.event("robot", &serde_json::json!({ "id": evil, "of": "\u{e0041}" }));
+            console.table(
+                &["robot", evil],
+                &[vec![evil.to_string(), "x".repeat(100_000)]],
+            );
+            console.event(
+                "robot",
+                &serde_json::json!({ "id": evil, "of": "\u{e0041}" }),
+            );
             console.counter(evil, 3, evil).update(3);
             let (out, err) = (out.read(), err.read());
             for text in [&out, &err] {
                 assert!(text.chars().all(|c| c == '\n' || !is_unseen(c)), "{text:?}");
-                assert!(text.lines().all(|line| !line.starts_with("warning: forged")), "{text}");
-                assert!(text.lines().all(|line| line.len() < 6000) || mode == Mode::Json, "{}", text.len());
+                assert!(
+                    text.lines()
+                        .all(|line| !line.starts_with("warning: forged")),
+                    "{text}"
+                );
+                assert!(
+                    text.lines().all(|line| line.len() < 6000) || mode == Mode::Json,
+                    "{}",
+                    text.len()
+                );
             }
             if mode == Mode::Json {
-                let last = out.lines().rfind(|line| line.contains("\"robot\"")).unwrap();
+                let last = out
+                    .lines()
+                    .rfind(|line| line.contains("\"robot\""))
+                    .unwrap();
                 let last: serde_json::Value = serde_json::from_str(last).unwrap();
-                assert_eq!((&last["id"], &last["of"]), (&evil.into(), &"\u{e0041}".into()));
+                assert_eq!(
+                    (&last["id"], &last["of"]),
+                    (&evil.into(), &"\u{e0041}".into())
+                );
             }
         }
     }
@@ -488,7 +606,10 @@ pub(super) mod tests {
     #[test]
     fn a_closed_pipe_ends_output_quietly() {
         let err = Page::default();
-        let out = Page { closed: true, ..Page::default() };
+        let out = Page {
+            closed: true,
+            ..Page::default()
+        };
         let console = Console::with_writers(Mode::Human, Box::new(out), Box::new(err.clone()));
         assert!(!console.is_closed());
         console.line("nobody reads this");

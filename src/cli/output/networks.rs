@@ -17,15 +17,21 @@ use std::path::{Path, PathBuf};
 /// file, if it was written.
 pub(crate) fn capacity(console: &Console, file: &CapacityFile, out: Option<&Path>) {
     if console.mode() == Mode::Json {
-        let written = out.filter(|_| !file.tasks.is_empty()).map(|out| out.display().to_string());
-        let done = serde_json::json!({ "file": written, "stopped": file.stopped, "tasks": file.tasks });
+        let written = out
+            .filter(|_| !file.tasks.is_empty())
+            .map(|out| out.display().to_string());
+        let done =
+            serde_json::json!({ "file": written, "stopped": file.stopped, "tasks": file.tasks });
         return console.event("capacity", &done);
     }
     // Stopped before the first result: nothing was written.
     if file.tasks.is_empty() {
         return;
     }
-    let rows = file.tasks.iter().map(|task| (task.task.as_str(), task.robots, task.accuracy, Some(task)));
+    let rows = file
+        .tasks
+        .iter()
+        .map(|task| (task.task.as_str(), task.robots, task.accuracy, Some(task)));
     papers_table(console, &file.dataset, rows);
     console.line("");
     for task in &file.tasks {
@@ -49,10 +55,21 @@ pub(crate) fn capacity(console: &Console, file: &CapacityFile, out: Option<&Path
     } else {
         "images of the training split"
     };
-    let physical = if file.physical_only { ", those found physical" } else { "" };
-    console.line(&format!("{}{physical}; early stopping waits on {waits}", file.selected));
+    let physical = if file.physical_only {
+        ", those found physical"
+    } else {
+        ""
+    };
+    console.line(&format!(
+        "{}{physical}; early stopping waits on {waits}",
+        file.selected
+    ));
     if let Some(out) = out {
-        console.line(&format!("wrote {} and {}", out.display(), out.with_extension("csv").display()));
+        console.line(&format!(
+            "wrote {} and {}",
+            out.display(),
+            out.with_extension("csv").display()
+        ));
     }
 }
 
@@ -65,8 +82,11 @@ pub(super) fn papers_table<'a>(
 ) {
     let rows = tasks.map(|(task, robots, accuracy, capacity)| {
         let paper = published::row(dataset, task);
-        let own =
-            |network: &str| capacity.and_then(|known| known.size_of(network)).map_or_else(unknown, size);
+        let own = |network: &str| {
+            capacity
+                .and_then(|known| known.size_of(network))
+                .map_or_else(unknown, size)
+        };
         let theirs = |of: fn(&published::PaperRow) -> Option<f64>| {
             paper.map_or_else(unknown, |row| size(of(row).map(Crossing::At)))
         };
@@ -81,8 +101,16 @@ pub(super) fn papers_table<'a>(
             theirs(|row| row.cnn),
         ]
     });
-    let headers =
-        ["task", "robots", "accuracy %", "paper's %", "MLP neurons", "paper's", "CNN kernels", "paper's"];
+    let headers = [
+        "task",
+        "robots",
+        "accuracy %",
+        "paper's %",
+        "MLP neurons",
+        "paper's",
+        "CNN kernels",
+        "paper's",
+    ];
     console.table(&headers, &rows.collect::<Vec<_>>());
 }
 
@@ -111,7 +139,11 @@ pub(crate) fn table(console: &Console, finished: &ReproduceOutcome) {
     let number = |value: Option<f64>| value.map_or_else(unknown, |value| number::fixed(value, 1));
     let rows = finished.rows.iter().map(|row| {
         let own = |value: Option<Crossing>| {
-            if row.robots == 0 { unknown() } else { size(value) }
+            if row.robots == 0 {
+                unknown()
+            } else {
+                size(value)
+            }
         };
         let paper = |value: Option<f64>| match row.paper_accuracy {
             None => unknown(),
@@ -152,6 +184,10 @@ pub(crate) fn table(console: &Console, finished: &ReproduceOutcome) {
     if finished.files.is_empty() {
         return;
     }
-    let files: Vec<String> = finished.files.iter().map(|file| file.display().to_string()).collect();
+    let files: Vec<String> = finished
+        .files
+        .iter()
+        .map(|file| file.display().to_string())
+        .collect();
     console.line(&format!("wrote {}", files.join(" and ")));
 }

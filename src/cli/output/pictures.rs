@@ -30,27 +30,42 @@ pub(crate) enum Format {
 }
 
 impl Format {
-    const ALL: [(Format, &str); 4] =
-        [(Format::Gif, "gif"), (Format::Html, "html"), (Format::Png, "png"), (Format::Terminal, "terminal")];
+    const ALL: [(Format, &str); 4] = [
+        (Format::Gif, "gif"),
+        (Format::Html, "html"),
+        (Format::Png, "png"),
+        (Format::Terminal, "terminal"),
+    ];
 }
 
 impl fmt::Display for Format {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        Format::ALL.iter().filter(|(format, _)| format == self).try_for_each(|(_, name)| f.write_str(name))
+        Format::ALL
+            .iter()
+            .filter(|(format, _)| format == self)
+            .try_for_each(|(_, name)| f.write_str(name))
     }
 }
 
 impl FromStr for Format {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
-        let found = Format::ALL.iter().find(|(_, name)| *name == text.to_lowercase());
-        found.map(|(format, _)| *format).ok_or_else(|| "expected gif, html, png or terminal".to_string())
+        let found = Format::ALL
+            .iter()
+            .find(|(_, name)| *name == text.to_lowercase());
+        found
+            .map(|(format, _)| *format)
+            .ok_or_else(|| "expected gif, html, png or terminal".to_string())
     }
 }
 
 /// Returns the requested formats, or by default an animation and a page.
 fn or_default(asked: &[Format]) -> &[Format] {
-    if asked.is_empty() { &[Format::Gif, Format::Html] } else { asked }
+    if asked.is_empty() {
+        &[Format::Gif, Format::Html]
+    } else {
+        asked
+    }
 }
 
 /// The pictures to make, and their files.
@@ -70,7 +85,13 @@ pub(crate) struct PicturesWanted {
 
 impl Default for PicturesWanted {
     fn default() -> Self {
-        PicturesWanted { files: Vec::new(), width: 480, every: 1, fps: 50, look: Look::Plain }
+        PicturesWanted {
+            files: Vec::new(),
+            width: 480,
+            every: 1,
+            fps: 50,
+            look: Look::Plain,
+        }
     }
 }
 
@@ -78,7 +99,10 @@ impl PicturesWanted {
     /// Chooses `replay-<name>.<format>` in a folder.
     pub(crate) fn beside(folder: &Path, name: &str, formats: &[Format]) -> Self {
         let file = |&format: &Format| (format, folder.join(format!("replay-{name}.{format}")));
-        PicturesWanted { files: or_default(formats).iter().map(file).collect(), ..PicturesWanted::default() }
+        PicturesWanted {
+            files: or_default(formats).iter().map(file).collect(),
+            ..PicturesWanted::default()
+        }
     }
 
     /// Takes the format from a file's extension; without one, chooses a file for each of `formats`.
@@ -87,13 +111,18 @@ impl PicturesWanted {
     /// Returns an error if the extension is no known format, or a file cannot be written.
     pub(crate) fn named(path: &Path, formats: &[Format]) -> Result<Self, Error> {
         folder::of_file(path)?;
-        let files = match path.extension().map(|ending| ending.to_string_lossy().into_owned()) {
+        let files = match path
+            .extension()
+            .map(|ending| ending.to_string_lossy().into_owned())
+        {
             None => or_default(formats)
                 .iter()
                 .map(|format| (*format, path.with_extension(format.to_string())))
                 .collect(),
             Some(ending) => {
-                let format = Format::from_str(&ending).ok().filter(|format| *format != Format::Terminal);
+                let format = Format::from_str(&ending)
+                    .ok()
+                    .filter(|format| *format != Format::Terminal);
                 let format = format.ok_or_else(|| {
                     Error::usage(format!(
                         "{}: expected a file name that ends in .gif, .html or .png",
@@ -101,8 +130,10 @@ impl PicturesWanted {
                     ))
                 })?;
                 if let Some(other) = formats.iter().find(|asked| **asked != format) {
-                    let text =
-                        format!("--format {other}: expected {format}, as --out {} says", path.display());
+                    let text = format!(
+                        "--format {other}: expected {format}, as --out {} says",
+                        path.display()
+                    );
                     return Err(Error::usage(text));
                 }
                 vec![(format, path.to_path_buf())]
@@ -112,7 +143,10 @@ impl PicturesWanted {
             .iter()
             .filter(|(format, _)| *format != Format::Terminal)
             .try_for_each(|(_, path)| folder::writable(path))?;
-        Ok(PicturesWanted { files, ..PicturesWanted::default() })
+        Ok(PicturesWanted {
+            files,
+            ..PicturesWanted::default()
+        })
     }
 }
 
@@ -156,7 +190,9 @@ pub(crate) fn make(
             Format::Html => html::write(path, recording, &title, &replay.about).map_err(failed)?,
             Format::Png => {
                 let walk = Walk::new(recording).map_err(failed)?;
-                let stage = Stage::new(&walk, wanted.width).map_err(failed)?.look(wanted.look);
+                let stage = Stage::new(&walk, wanted.width)
+                    .map_err(failed)?
+                    .look(wanted.look);
                 let picture = raster::picture(&walk, walk.frames() - 1, &stage).map_err(failed)?;
                 raster::write_png(path, &picture).map_err(failed)?;
             }
@@ -168,7 +204,11 @@ pub(crate) fn make(
         made.push(path.clone());
     }
     for phase in &recording.phases {
-        let way = if phase.displacement < 0.0 { "left" } else { "right" };
+        let way = if phase.displacement < 0.0 {
+            "left"
+        } else {
+            "right"
+        };
         console.line(&format!(
             "{}: sees {}, moves {} voxel lengths {way}",
             recording.robot,
@@ -179,6 +219,7 @@ pub(crate) fn make(
     if recording.unstable {
         console.warning("the simulation became unstable and ended early");
     }
-    made.iter().for_each(|path| console.line_about(path, &format!("wrote {}", path.display())));
+    made.iter()
+        .for_each(|path| console.line_about(path, &format!("wrote {}", path.display())));
     Ok(made)
 }

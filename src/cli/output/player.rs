@@ -41,7 +41,12 @@ struct Player {
 
 impl Player {
     fn new(frames: usize) -> Self {
-        Player { last: frames.saturating_sub(1), at: 0.0, is_paused: false, has_ended: false }
+        Player {
+            last: frames.saturating_sub(1),
+            at: 0.0,
+            is_paused: false,
+            has_ended: false,
+        }
     }
 
     fn frame(&self) -> usize {
@@ -53,7 +58,9 @@ impl Player {
             Key::Pause => self.is_paused = !self.is_paused,
             Key::Quit => self.has_ended = true,
             // A single step pauses.
-            Key::Forward => (self.at, self.is_paused) = ((self.frame() + 1).min(self.last) as f64, true),
+            Key::Forward => {
+                (self.at, self.is_paused) = ((self.frame() + 1).min(self.last) as f64, true)
+            }
             Key::Back => (self.at, self.is_paused) = (self.frame().saturating_sub(1) as f64, true),
         }
     }
@@ -73,14 +80,23 @@ impl Player {
 /// Returns an error if a signal stops it. The terminal is restored in any case.
 pub(crate) fn play(console: &Console, walk: &Walk) -> Result<(), Error> {
     let variable = |name| std::env::var(name).unwrap_or_default();
-    let depth = Depth::of(console.has_colour(), &variable("COLORTERM"), &variable("TERM"));
+    let depth = Depth::of(
+        console.has_colour(),
+        &variable("COLORTERM"),
+        &variable("TERM"),
+    );
     let Some(mut live) = console.live() else {
         let (columns, rows) = view(USUAL, false);
         match console.mode() {
-            Mode::Json => {
-                console.line(&terminal::frame(walk, walk.frames() - 1, columns, rows, Depth::Plain))
-            }
-            _ => console.text(&(terminal::frame(walk, walk.frames() - 1, columns, rows, depth) + "\n")),
+            Mode::Json => console.line(&terminal::frame(
+                walk,
+                walk.frames() - 1,
+                columns,
+                rows,
+                Depth::Plain,
+            )),
+            _ => console
+                .text(&(terminal::frame(walk, walk.frames() - 1, columns, rows, depth) + "\n")),
         }
         return Ok(());
     };
@@ -106,8 +122,15 @@ pub(crate) fn play(console: &Console, walk: &Walk) -> Result<(), Error> {
             let (columns, rows) = view(place, screen.has_keys);
             let mut picture = terminal::frame(walk, player.frame(), columns, rows, depth);
             if screen.has_keys {
-                let word = if player.is_paused { "space plays on" } else { "space pauses " };
-                let line: String = format!("{word}   , . step   q quits").chars().take(columns).collect();
+                let word = if player.is_paused {
+                    "space plays on"
+                } else {
+                    "space pauses "
+                };
+                let line: String = format!("{word}   , . step   q quits")
+                    .chars()
+                    .take(columns)
+                    .collect();
                 picture += &format!("\n{line}\x1b[K");
             }
             // In raw mode, the terminal does not return to the first column by itself.
@@ -127,13 +150,19 @@ pub(crate) fn play(console: &Console, walk: &Walk) -> Result<(), Error> {
 }
 
 fn terminal_size() -> (u16, u16) {
-    size().ok().filter(|(columns, rows)| *columns > 0 && *rows > 0).unwrap_or(USUAL)
+    size()
+        .ok()
+        .filter(|(columns, rows)| *columns > 0 && *rows > 0)
+        .unwrap_or(USUAL)
 }
 
 /// Returns the picture's columns and rows, less a free column and line, and a line for the keys.
 fn view((columns, rows): (u16, u16), has_keys: bool) -> (usize, usize) {
     let free = if has_keys { 2 } else { 1 };
-    let (columns, rows) = (usize::from(columns).saturating_sub(1), usize::from(rows).saturating_sub(free));
+    let (columns, rows) = (
+        usize::from(columns).saturating_sub(1),
+        usize::from(rows).saturating_sub(free),
+    );
     (columns.clamp(1, LARGEST.0), rows.clamp(1, LARGEST.1))
 }
 
@@ -179,7 +208,9 @@ fn meaning(event: &Event) -> Option<Key> {
         return None;
     }
     match key.code {
-        KeyCode::Char('c' | 'd') if key.modifiers.contains(KeyModifiers::CONTROL) => Some(Key::Quit),
+        KeyCode::Char('c' | 'd') if key.modifiers.contains(KeyModifiers::CONTROL) => {
+            Some(Key::Quit)
+        }
         KeyCode::Char('q') | KeyCode::Esc => Some(Key::Quit),
         KeyCode::Char(' ') => Some(Key::Pause),
         KeyCode::Char('.') | KeyCode::Right => Some(Key::Forward),
@@ -216,7 +247,10 @@ mod tests {
         for _ in 0..9 {
             player.press(Key::Forward);
         }
-        assert_eq!((player.frame(), player.is_paused, player.has_ended), (3, true, false));
+        assert_eq!(
+            (player.frame(), player.is_paused, player.has_ended),
+            (3, true, false)
+        );
         player.press(Key::Back);
         assert_eq!(player.frame(), 2);
         player.press(Key::Pause);
@@ -234,8 +268,17 @@ mod tests {
         assert_eq!(key(KeyCode::Char('.'), plain), Some(Key::Forward));
         assert_eq!(key(KeyCode::Left, plain), Some(Key::Back));
         assert_eq!(key(KeyCode::Char('q'), plain), Some(Key::Quit));
-        assert_eq!(key(KeyCode::Char('c'), KeyModifiers::CONTROL), Some(Key::Quit));
-        assert_eq!((key(KeyCode::Char('c'), plain), meaning(&Event::Resize(1, 1))), (None, None));
+        assert_eq!(
+            key(KeyCode::Char('c'), KeyModifiers::CONTROL),
+            Some(Key::Quit)
+        );
+        assert_eq!(
+            (
+                key(KeyCode::Char('c'), plain),
+                meaning(&Event::Resize(1, 1))
+            ),
+            (None, None)
+        );
     }
 
     #[test]

@@ -17,7 +17,9 @@ pub struct Recent<T> {
 impl<T: Copy> Recent<T> {
     /// Begins after so many seconds.
     pub fn new(seconds: f64, begin: T) -> Self {
-        Recent { marks: [(seconds, begin); 2] }
+        Recent {
+            marks: [(seconds, begin); 2],
+        }
     }
 
     /// Changes the earlier state, so that something counts as done before.
@@ -47,36 +49,60 @@ pub struct ProgressWords {
 
 /// Describes the progress of an evolution, given its state some seconds ago.
 pub fn generation_line(now: &Generation, before: &Generation, seconds: f64) -> ProgressWords {
-    let best = now.best.map_or("none".into(), |best| number::fixed(best, 2));
+    let best = now
+        .best
+        .map_or("none".into(), |best| number::fixed(best, 2));
     let rate = rate(now.evaluations.saturating_sub(before.evaluations), seconds);
     let mut parts = vec![format!("{}/{}", now.done, now.total)];
     parts.extend(left(before.done, now.done, now.total, seconds));
     parts.push(format!("best {best}"));
     parts.push(format!("coverage {} %", number::percent(now.coverage)));
     parts.push(format!("{rate} evaluations/s"));
-    ProgressWords { label: "generation".to_string(), parts }
+    ProgressWords {
+        label: "generation".to_string(),
+        parts,
+    }
 }
 
 /// Describes the progress of something counted: images, robots or, with the unit "bytes",
 /// megabytes. `before` of them were done some seconds ago.
-pub fn count_line(label: &str, [before, done, total]: [u64; 3], unit: &str, seconds: f64) -> ProgressWords {
+pub fn count_line(
+    label: &str,
+    [before, done, total]: [u64; 3],
+    unit: &str,
+    seconds: f64,
+) -> ProgressWords {
     let did = done.saturating_sub(before);
     let (counts, speed) = if unit == "bytes" {
         let mega = |bytes: f64| number::fixed(bytes / 1e6, 1);
-        let speed = if seconds > 0.0 { did as f64 / seconds } else { 0.0 };
+        let speed = if seconds > 0.0 {
+            did as f64 / seconds
+        } else {
+            0.0
+        };
         let [done, total, speed] = [done as f64, total as f64, speed].map(mega);
         (format!("{done}/{total} MB"), format!("{speed} MB/s"))
     } else {
-        (format!("{done}/{total} {unit}"), format!("{} {unit}/s", rate(did, seconds)))
+        (
+            format!("{done}/{total} {unit}"),
+            format!("{} {unit}/s", rate(did, seconds)),
+        )
     };
     let mut parts = vec![counts];
     parts.extend(left(before, done, total, seconds));
     parts.push(speed);
-    ProgressWords { label: label.to_string(), parts }
+    ProgressWords {
+        label: label.to_string(),
+        parts,
+    }
 }
 
 fn rate(count: u64, seconds: f64) -> String {
-    let rate = if seconds > 0.0 { count as f64 / seconds } else { 0.0 };
+    let rate = if seconds > 0.0 {
+        count as f64 / seconds
+    } else {
+        0.0
+    };
     number::fixed(rate, if rate < 10.0 { 1 } else { 0 })
 }
 
@@ -116,12 +142,30 @@ mod tests {
 
     #[test]
     fn a_resumed_run_counts_its_speed_from_where_it_resumed() {
-        let begin = Generation { done: 100, total: 200, best: None, coverage: 0.0, evaluations: 2000 };
-        let now = Generation { done: 150, best: Some(3.1449), coverage: 0.25, evaluations: 3000, ..begin };
+        let begin = Generation {
+            done: 100,
+            total: 200,
+            best: None,
+            coverage: 0.0,
+            evaluations: 2000,
+        };
+        let now = Generation {
+            done: 150,
+            best: Some(3.1449),
+            coverage: 0.25,
+            evaluations: 3000,
+            ..begin
+        };
         let line = text(generation_line(&now, &begin, 10.0));
-        assert_eq!(line, "generation: 150/200, 10 s left, best 3.14, coverage 25.0 %, 100 evaluations/s");
+        assert_eq!(
+            line,
+            "generation: 150/200, 10 s left, best 3.14, coverage 25.0 %, 100 evaluations/s"
+        );
         let line = text(generation_line(&begin, &begin, 0.0));
-        assert!(line.ends_with("100/200, best none, coverage 0.0 %, 0.0 evaluations/s"), "{line}");
+        assert!(
+            line.ends_with("100/200, best none, coverage 0.0 %, 0.0 evaluations/s"),
+            "{line}"
+        );
     }
 
     #[test]
@@ -129,13 +173,22 @@ mod tests {
         let line = |label: &str, counts: [u64; 3], unit: &str, seconds: f64| {
             text(count_line(label, counts, unit, seconds))
         };
-        assert_eq!(line("eval", [0, 50, 100], "images", 5.0), "eval: 50/100 images, 5 s left, 10 images/s");
+        assert_eq!(
+            line("eval", [0, 50, 100], "images", 5.0),
+            "eval: 50/100 images, 5 s left, 10 images/s"
+        );
         let bytes = line("train images", [0, 5_000_000, 10_000_000], "bytes", 2.0);
         assert_eq!(bytes, "train images: 5.0/10.0 MB, 2 s left, 2.5 MB/s");
         assert!(line("x", [0, 3, 0], "images", 0.0).contains("3/0"));
         // Work known before took no time.
-        assert_eq!(line("x", [40, 40, 50], "rollouts", 1e-9), "x: 40/50 rollouts, 0.0 rollouts/s");
-        assert_eq!(line("x", [40, 45, 50], "rollouts", 5.0), "x: 45/50 rollouts, 5 s left, 1.0 rollouts/s");
+        assert_eq!(
+            line("x", [40, 40, 50], "rollouts", 1e-9),
+            "x: 40/50 rollouts, 0.0 rollouts/s"
+        );
+        assert_eq!(
+            line("x", [40, 45, 50], "rollouts", 5.0),
+            "x: 45/50 rollouts, 5 s left, 1.0 rollouts/s"
+        );
     }
 
     #[test]
@@ -163,10 +216,17 @@ mod tests {
     #[test]
     fn plain_lines_come_every_ten_seconds_or_tenth_and_at_the_end() {
         let mut pacer = Pacer::default();
-        let due: Vec<bool> =
-            [(0.0, 0.0), (1.0, 0.05), (2.0, 0.1), (3.0, 0.15), (12.0, 0.16), (12.5, 0.17), (13.0, 1.0)]
-                .map(|(seconds, share)| pacer.is_due(seconds, share))
-                .to_vec();
+        let due: Vec<bool> = [
+            (0.0, 0.0),
+            (1.0, 0.05),
+            (2.0, 0.1),
+            (3.0, 0.15),
+            (12.0, 0.16),
+            (12.5, 0.17),
+            (13.0, 1.0),
+        ]
+        .map(|(seconds, share)| pacer.is_due(seconds, share))
+        .to_vec();
         assert_eq!(due, [true, false, true, false, true, false, true]);
         assert!(!pacer.is_due(14.0, 1.0));
     }

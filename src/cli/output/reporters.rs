@@ -22,7 +22,10 @@ enum Line<'c> {
 impl<'c> Reporter<'c> {
     /// Creates a reporter on a console.
     pub fn new(console: &'c Console) -> Self {
-        Reporter { console, line: RwLock::new(Line::None) }
+        Reporter {
+            console,
+            line: RwLock::new(Line::None),
+        }
     }
 
     fn show(&self, line: impl FnOnce() -> Line<'c>) {
@@ -62,8 +65,10 @@ impl Observer for Reporter<'_> {
     }
 
     fn generation(&self, generation: &Generation) {
-        let is_shown =
-            matches!(&*self.line.read().unwrap_or_else(PoisonError::into_inner), Line::Evolution(_));
+        let is_shown = matches!(
+            &*self.line.read().unwrap_or_else(PoisonError::into_inner),
+            Line::Evolution(_)
+        );
         if !is_shown {
             self.show(|| Line::Evolution(self.console.progress(generation.total)));
         }
@@ -82,7 +87,12 @@ impl Observer for Reporter<'_> {
 
     fn failed(&self, error: &Error, then: &str) {
         let Explained { message, hint } = explain(error);
-        let parts = [Some(message), hint, Some(then.to_string()).filter(|then| !then.is_empty())];
-        self.console.warning(&parts.into_iter().flatten().collect::<Vec<_>>().join("; "));
+        let parts = [
+            Some(message),
+            hint,
+            Some(then.to_string()).filter(|then| !then.is_empty()),
+        ];
+        self.console
+            .warning(&parts.into_iter().flatten().collect::<Vec<_>>().join("; "));
     }
 }

@@ -12,7 +12,12 @@ use std::path::Path;
 
 /// Writes the results of a measurement, a line per robot.
 pub(crate) fn response(console: &Console, finished: &ResponseOutcome, out: &Path) {
-    let ResponseOutcome { file, stopped, unwritten, .. } = finished;
+    let ResponseOutcome {
+        file,
+        stopped,
+        unwritten,
+        ..
+    } = finished;
     let written = unwritten.is_none() && !file.robots.is_empty();
     if console.mode() == Mode::Json {
         let done = serde_json::json!({
@@ -25,7 +30,14 @@ pub(crate) fn response(console: &Console, finished: &ResponseOutcome, out: &Path
     if file.robots.is_empty() {
         return;
     }
-    let mut headers = vec!["robot", "places", "certain", "explained %", "scatter", "relative error"];
+    let mut headers = vec![
+        "robot",
+        "places",
+        "certain",
+        "explained %",
+        "scatter",
+        "relative error",
+    ];
     headers.extend(["at no width", "rollouts", "unstable", "ended by"]);
     let (fitness, accuracy) = match &file.setting.task {
         Some(task) => (format!("fitness of {task}"), format!("% correct of {task}")),
@@ -38,20 +50,34 @@ pub(crate) fn response(console: &Console, finished: &ResponseOutcome, out: &Path
         headers.push("stimulus.margin");
     }
     let is_taught = file.setting.task.is_some();
-    let rows = file.robots.iter().map(|robot| row(robot, is_taught, file.setting.windows > 0));
+    let rows = file
+        .robots
+        .iter()
+        .map(|robot| row(robot, is_taught, file.setting.windows > 0));
     console.table(&headers, &rows.collect::<Vec<_>>());
     let count = file.setting.conditions.len();
-    console.line(&format!("{count} conditions (start, length limits); voxel lengths, right positive"));
+    console.line(&format!(
+        "{count} conditions (start, length limits); voxel lengths, right positive"
+    ));
     if written {
-        console.line(&format!("wrote {} and {}", out.display(), out.with_extension("csv").display()));
+        console.line(&format!(
+            "wrote {} and {}",
+            out.display(),
+            out.with_extension("csv").display()
+        ));
     }
 }
 
 fn row(robot: &RobotResponse, is_taught: bool, has_window: bool) -> Vec<String> {
-    let certain = robot.places.iter().filter(|place| !place.is_uncertain()).count();
+    let certain = robot
+        .places
+        .iter()
+        .filter(|place| !place.is_uncertain())
+        .count();
     let known = robot.intercepts.iter().flatten();
-    let (low, high) =
-        known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &d| (low.min(d), high.max(d)));
+    let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &d| {
+        (low.min(d), high.max(d))
+    });
     let signed = |displacement: f64| number::signed(displacement, 1);
     let mut row = vec![
         robot.id.clone(),
@@ -60,7 +86,12 @@ fn row(robot: &RobotResponse, is_taught: bool, has_window: bool) -> Vec<String> 
         percent(robot.r_squared.max(0.0)),
         number::fixed(robot.scatter, 1),
         number::fixed(robot.relative_error, 2),
-        format!("{} ({} to {})", signed(robot.intercept), signed(low), signed(high)),
+        format!(
+            "{} ({} to {})",
+            signed(robot.intercept),
+            signed(low),
+            signed(high)
+        ),
         robot.rollouts.to_string(),
         robot.unstable.to_string(),
         match robot.ended_by {
@@ -75,7 +106,10 @@ fn row(robot: &RobotResponse, is_taught: bool, has_window: bool) -> Vec<String> 
                 let [low, high] = taught.fitness_interval.map(|end| number::fixed(end, 2));
                 let fitness = format!("{} ({low} to {high})", number::fixed(taught.fitness, 2));
                 let [low, high] = taught.accuracy_interval.map(percent);
-                [fitness, format!("{} ({low} to {high})", percent(taught.accuracy))]
+                [
+                    fitness,
+                    format!("{} ({low} to {high})", percent(taught.accuracy)),
+                ]
             }
         });
     }
@@ -93,7 +127,11 @@ fn row(robot: &RobotResponse, is_taught: bool, has_window: bool) -> Vec<String> 
 pub(crate) fn pictures(console: &Console, finished: &ResponseOutcome) -> Result<(), PictureError> {
     let ResponseOutcome { file, pictures, .. } = finished;
     for (robot, [svg, png]) in file.robots.iter().zip(pictures) {
-        let of = format!("robot {}, {}", robot.id, published::provenance(&file.run, file.run_seed));
+        let of = format!(
+            "robot {}, {}",
+            robot.id,
+            published::provenance(&file.run, file.run_seed)
+        );
         let figure = plot::response(robot, file.setting.task.as_deref(), &of);
         write_whole(svg, figure.svg().as_bytes())?;
         write_whole(png, &figure.print()?)?;

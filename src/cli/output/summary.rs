@@ -55,7 +55,15 @@ pub(crate) fn evolution(console: &Console, finished: &EvolveOutcome, out: &Path,
             kinds.total.to_string(),
         ]
     });
-    let headers = ["robot", "task", "fitness", "displacements", "muscle", "sensor", "voxels"];
+    let headers = [
+        "robot",
+        "task",
+        "fitness",
+        "displacements",
+        "muscle",
+        "sensor",
+        "voxels",
+    ];
     console.table(&headers, &rows.collect::<Vec<_>>());
     let stats = run.stats;
     let cells = run.dimensions.possible_cells;
@@ -67,7 +75,10 @@ pub(crate) fn evolution(console: &Console, finished: &EvolveOutcome, out: &Path,
         counted(run.generations, "generation", "generations"),
         duration(totals.seconds)
     ));
-    console.line(&format!("robots see {}", run.config.stimulus.part(finished.size)));
+    console.line(&format!(
+        "robots see {}",
+        run.config.stimulus.part(finished.size)
+    ));
     let showings = (totals.simulated + totals.saved()).max(1) as f64;
     let share = |count: u64| percent(count as f64 / showings);
     console.line(&format!(
@@ -95,15 +106,26 @@ pub(crate) fn evolution(console: &Console, finished: &EvolveOutcome, out: &Path,
     let archive = in_shell(&out.join(RUN_JSON));
     // Gaits cannot tell images apart yet.
     if run.config.measures_response() {
-        return console.suggest("next:", &format!("morphcog train --archive {archive} --task \"4|9\""));
+        return console.suggest(
+            "next:",
+            &format!("morphcog train --archive {archive} --task \"4|9\""),
+        );
     }
-    console.suggest("next:", &format!("morphcog replay --robot best --archive {archive}"));
+    console.suggest(
+        "next:",
+        &format!("morphcog replay --robot best --archive {archive}"),
+    );
     console.suggest("     ", &format!("morphcog eval --archive {archive}"));
 }
 
 /// Writes the results of a training.
 pub(crate) fn training(console: &Console, finished: &train::TrainOutcome, out: &Path) {
-    let train::TrainOutcome { run, rollouts, size, .. } = finished;
+    let train::TrainOutcome {
+        run,
+        rollouts,
+        size,
+        ..
+    } = finished;
     let Some(robot) = run.best() else { return };
     if console.mode() == Mode::Json {
         let done = serde_json::json!({
@@ -122,7 +144,10 @@ pub(crate) fn training(console: &Console, finished: &train::TrainOutcome, out: &
         run.training_images.len(),
         counted(*rollouts, "rollout", "rollouts")
     ));
-    console.line(&format!("of an image it sees {}", run.config.stimulus.part(*size)));
+    console.line(&format!(
+        "of an image it sees {}",
+        run.config.stimulus.part(*size)
+    ));
     console.line(&format!("wrote {}", out.display()));
 }
 
@@ -133,9 +158,17 @@ pub(crate) fn validation(console: &Console, best: &[Validated]) {
     }
     let rows = best.iter().map(|robot| {
         let of = format!("{} of {}", robot.right, robot.images);
-        vec![robot.id.clone(), robot.task.clone(), of, percent(robot.balanced_accuracy)]
+        vec![
+            robot.id.clone(),
+            robot.task.clone(),
+            of,
+            percent(robot.balanced_accuracy),
+        ]
     });
-    console.table(&["best on validation", "task", "correct", "balanced %"], &rows.collect::<Vec<_>>());
+    console.table(
+        &["best on validation", "task", "correct", "balanced %"],
+        &rows.collect::<Vec<_>>(),
+    );
 }
 
 /// Writes the results of an evaluation: a table per robot, the means, the baselines and the paper's
@@ -160,8 +193,18 @@ pub(crate) fn evaluation(
         return console.event("evaluated", &done);
     }
     let classes: Vec<u8> = report.robots[0].per_class.keys().copied().collect();
-    let names: Vec<String> = classes.iter().map(|class| format!("% of {class}")).collect();
-    let mut headers = vec!["robot", "task", "fitness", "accuracy %", "95 % interval", "balanced %"];
+    let names: Vec<String> = classes
+        .iter()
+        .map(|class| format!("% of {class}"))
+        .collect();
+    let mut headers = vec![
+        "robot",
+        "task",
+        "fitness",
+        "accuracy %",
+        "95 % interval",
+        "balanced %",
+    ];
     headers.extend(names.iter().map(String::as_str));
     headers.extend(["mean |d|", "not moved %", "unstable", "rollouts"]);
     let validated = report.robots.iter().any(|robot| robot.validation.is_some());
@@ -169,9 +212,17 @@ pub(crate) fn evaluation(
     let rows = report.robots.iter().map(|robot| {
         let mut row = of_robot(robot);
         row.extend(robot.per_class.values().map(|share| percent(*share)));
-        row.extend([number::fixed(robot.mean_distance, 1), percent(robot.not_moved)]);
+        row.extend([
+            number::fixed(robot.mean_distance, 1),
+            percent(robot.not_moved),
+        ]);
         row.extend([robot.unstable.to_string(), robot.simulated.to_string()]);
-        row.extend(robot.validation.as_ref().map(|v| percent(v.balanced_accuracy)));
+        row.extend(
+            robot
+                .validation
+                .as_ref()
+                .map(|v| percent(v.balanced_accuracy)),
+        );
         row
     });
     console.table(&headers, &rows.collect::<Vec<_>>());
@@ -186,12 +237,15 @@ pub(crate) fn evaluation(
             mean.robots.to_string(),
             percent(mean.accuracy),
             mean.standard_deviation.map_or("–".to_string(), percent),
-            mean.interval
-                .map_or("–".to_string(), |[low, high]| format!("{}–{}", percent(low), percent(high))),
+            mean.interval.map_or("–".to_string(), |[low, high]| {
+                format!("{}–{}", percent(low), percent(high))
+            }),
             percent(mean.balanced_accuracy),
             baseline(|b| b.larger_group),
             baseline(|b| b.best_single_pixel),
-            baselines.and_then(|b| b.nearest_training_image).map_or("–".to_string(), percent),
+            baselines
+                .and_then(|b| b.nearest_training_image)
+                .map_or("–".to_string(), percent),
         ]
     });
     let headers = [
@@ -211,7 +265,8 @@ pub(crate) fn evaluation(
     let as_published = |task: &String| is_test && published::row(&report.dataset, task).is_some();
     if capacity.is_some() || report.means.keys().any(as_published) {
         let tasks = report.means.iter().map(|(task, mean)| {
-            let known = capacity.and_then(|file| file.tasks.iter().find(|known| known.task == *task));
+            let known =
+                capacity.and_then(|file| file.tasks.iter().find(|known| known.task == *task));
             (task.as_str(), mean.robots, mean.accuracy, known)
         });
         networks::papers_table(console, &report.dataset, tasks);
@@ -226,7 +281,11 @@ pub(crate) fn evaluation(
         report.threshold
     ));
     let Some(out) = out else { return };
-    console.line(&format!("wrote {} and {}", out.display(), out.with_extension("csv").display()));
+    console.line(&format!(
+        "wrote {} and {}",
+        out.display(),
+        out.with_extension("csv").display()
+    ));
     if capacity.is_none() && is_test {
         let command = format!("morphcog capacity --eval {}", in_shell(out));
         console.suggest("which networks are as accurate?", &command);
@@ -236,10 +295,15 @@ pub(crate) fn evaluation(
 /// Writes the simulation speeds of this machine.
 pub(crate) fn speeds(console: &Console, speeds: &[Speed]) {
     if console.mode() == Mode::Json {
-        return speeds.iter().for_each(|speed| console.event("speed", speed));
+        return speeds
+            .iter()
+            .for_each(|speed| console.event("speed", speed));
     }
     let rows = speeds.iter().map(|speed| {
-        let (micros, steps) = (number::fixed(speed.microseconds, 2), number::fixed(speed.control_steps, 0));
+        let (micros, steps) = (
+            number::fixed(speed.microseconds, 2),
+            number::fixed(speed.control_steps, 0),
+        );
         vec![
             speed.body.to_string(),
             speed.voxels.to_string(),
@@ -248,8 +312,13 @@ pub(crate) fn speeds(console: &Console, speeds: &[Speed]) {
             steps,
         ]
     });
-    let headers =
-        ["body", "voxels", "instruction set", "µs per substep", "control steps per second and core"];
+    let headers = [
+        "body",
+        "voxels",
+        "instruction set",
+        "µs per substep",
+        "control steps per second and core",
+    ];
     console.table(&headers, &rows.collect::<Vec<_>>());
     console.line(match CLOCK {
         "processor" => "processor time of one thread: other work on the machine does not count",
@@ -263,27 +332,54 @@ pub(crate) fn gallery(console: &Console, robots: &[Published]) {
     let rows = robots.iter().map(|robot| {
         let counts = robot.body.counts();
         let counts = [counts.muscle, counts.sensor, counts.total].map(|count| count.to_string());
-        [vec![robot.name.clone(), "0|1".to_string(), number::fixed(robot.fitness, 2)], counts.to_vec()]
-            .concat()
+        [
+            vec![
+                robot.name.clone(),
+                "0|1".to_string(),
+                number::fixed(robot.fitness, 2),
+            ],
+            counts.to_vec(),
+        ]
+        .concat()
     });
-    let headers = ["robot", "task", "published fitness", "muscle", "sensor", "voxels"];
+    let headers = [
+        "robot",
+        "task",
+        "published fitness",
+        "muscle",
+        "sensor",
+        "voxels",
+    ];
     console.table(&headers, &rows.collect::<Vec<_>>());
-    console.info("watch one: morphcog replay --robot XFJPI (needs MNIST; or add --dataset builtin)");
+    console
+        .info("watch one: morphcog replay --robot XFJPI (needs MNIST; or add --dataset builtin)");
 }
 
 /// Lists the built-in configs: name and first comment.
 pub(crate) fn configs(console: &Console, configs: &[(&str, &str)]) {
     let rows = configs.iter().map(|(name, text)| {
-        let about: Vec<&str> = text.lines().map_while(|line| line.strip_prefix("# ")).collect();
+        let about: Vec<&str> = text
+            .lines()
+            .map_while(|line| line.strip_prefix("# "))
+            .collect();
         let about = about.join(" ");
-        vec![name.to_string(), about.split_once(". ").map_or(about.as_str(), |(first, _)| first).to_string()]
+        vec![
+            name.to_string(),
+            about
+                .split_once(". ")
+                .map_or(about.as_str(), |(first, _)| first)
+                .to_string(),
+        ]
     });
     console.table(&["config", "what it is"], &rows.collect::<Vec<_>>());
 }
 
 /// Lists the schemas: name and subject.
 pub(crate) fn schemas(console: &Console, schemas: &[(&str, &str)]) {
-    let rows: Vec<_> = schemas.iter().map(|(name, of)| vec![name.to_string(), of.to_string()]).collect();
+    let rows: Vec<_> = schemas
+        .iter()
+        .map(|(name, of)| vec![name.to_string(), of.to_string()])
+        .collect();
     console.table(&["schema", "what it is of"], &rows);
 }
 
@@ -319,25 +415,32 @@ pub(crate) fn dataset(console: &Console, found: &FoundDataset) {
             images.images, images.height, images.width, images.fingerprint
         ));
         for file in &images.files {
-            let is_published = if found.published.contains(&file.name) { ", as published" } else { "" };
+            let is_published = if found.published.contains(&file.name) {
+                ", as published"
+            } else {
+                ""
+            };
             console.line(&format!(
                 "  {}: {} bytes, SHA-256 {}{is_published}",
                 file.name, file.bytes, file.sha256
             ));
         }
         rows.extend(
-            images
-                .per_class
-                .iter()
-                .map(|(class, count)| vec![split.to_string(), class.to_string(), count.to_string()]),
+            images.per_class.iter().map(|(class, count)| {
+                vec![split.to_string(), class.to_string(), count.to_string()]
+            }),
         );
     }
     console.table(&["split", "class", "images"], &rows);
     for (split, known) in &found.others {
-        console
-            .warning(&format!("{split}: these are the images of {known}, here under the name {}", info.name));
+        console.warning(&format!(
+            "{split}: these are the images of {known}, here under the name {}",
+            info.name
+        ));
     }
-    info.differences().iter().for_each(|text| console.warning(text));
+    info.differences()
+        .iter()
+        .for_each(|text| console.warning(text));
     for (split, problem) in &found.problems {
         console.warning(&format!("{split}: {problem}"));
     }
@@ -358,7 +461,8 @@ fn walks(images: &[ImageRef], displacements: &[f64]) -> String {
         let (sum, count) = classes.entry(image.label).or_default();
         (*sum, *count) = (*sum + displacement, *count + 1.0);
     }
-    let mean =
-        |(class, (sum, count)): (u8, (f64, f64))| format!("{class}: mean {}", number::signed(sum / count, 1));
+    let mean = |(class, (sum, count)): (u8, (f64, f64))| {
+        format!("{class}: mean {}", number::signed(sum / count, 1))
+    };
     classes.into_iter().map(mean).collect::<Vec<_>>().join("  ")
 }

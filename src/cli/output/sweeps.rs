@@ -32,13 +32,21 @@ pub(crate) fn status(console: &Console, all: &[TaskStatus]) {
             status.state.name().to_string(),
             generations.unwrap_or("–".to_string()),
             time(status.seconds),
-            if status.state == TaskState::Done { "–".to_string() } else { time(status.seconds_left) },
+            if status.state == TaskState::Done {
+                "–".to_string()
+            } else {
+                time(status.seconds_left)
+            },
             status.about.clone().unwrap_or_default(),
         ]
     };
     let mut headers = vec!["task", "name", "state", "generations", "time", "left"];
     // Cells without a header are left out.
-    headers.extend(all.iter().any(|status| status.about.is_some()).then_some("about"));
+    headers.extend(
+        all.iter()
+            .any(|status| status.about.is_some())
+            .then_some("about"),
+    );
     console.table(&headers, &all.iter().map(row).collect::<Vec<_>>());
     console.line("");
     console.line(&in_short(all));
@@ -48,7 +56,10 @@ pub(crate) fn status(console: &Console, all: &[TaskStatus]) {
 fn in_short(all: &[TaskStatus]) -> String {
     let count = |state: TaskState| all.iter().filter(|status| status.state == state).count();
     let counts = TaskState::ALL.map(|state| (count(state), state.name()));
-    let counts = counts.iter().filter(|(count, _)| *count > 0).map(|(count, name)| format!("{count} {name}"));
+    let counts = counts
+        .iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, name)| format!("{count} {name}"));
     let counts = counts.collect::<Vec<_>>().join(", ");
     let open = || all.iter().filter(|status| status.state != TaskState::Done);
     let left: Option<f64> = open().map(|status| status.seconds_left).sum();
@@ -74,7 +85,10 @@ pub(crate) fn collected(
     std::fs::create_dir_all(out).map_err(|error| Error::writing(out, &error))?;
     write_atomically(&path, &csv(&found.rows)).map_err(|error| Error::writing(&path, &error))?;
     match console.mode() {
-        Mode::Json => found.rows.iter().for_each(|row| console.event("collected", &Event::of(row))),
+        Mode::Json => found
+            .rows
+            .iter()
+            .for_each(|row| console.event("collected", &Event::of(row))),
         _ => table(console, &found.rows),
     }
     console.line("");
@@ -94,7 +108,10 @@ pub(crate) fn collected(
         draw("sweep-progress", plot::progress(&found.progress))?;
         differences(console, &found.progress);
     }
-    let open = status.iter().filter(|status| status.state != TaskState::Done).count();
+    let open = status
+        .iter()
+        .filter(|status| status.state != TaskState::Done)
+        .count();
     if open > 0 {
         console.warning(&format!("this is not all: {}", in_short(status)));
     }
@@ -116,8 +133,18 @@ impl<'a> Event<'a> {
     fn of(row: &'a SweepRow) -> Self {
         // Values are stored as text; numbers become numbers here.
         let value = |text: &str| serde_json::from_str(text).unwrap_or_else(|_| Value::from(text));
-        let varied = row.varied.iter().map(|(key, text)| (key.clone(), value(text))).collect();
-        Event { number: row.number, name: &row.name, state: row.state, varied, run: Columns::of(row) }
+        let varied = row
+            .varied
+            .iter()
+            .map(|(key, text)| (key.clone(), value(text)))
+            .collect();
+        Event {
+            number: row.number,
+            name: &row.name,
+            state: row.state,
+            varied,
+            run: Columns::of(row),
+        }
     }
 }
 
@@ -132,12 +159,15 @@ fn table(console: &Console, rows: &[SweepRow]) {
             row.name.clone(),
             row.state.name().to_string(),
             run.map_or("–".to_string(), |run| run.recognises.clone()),
-            run.and_then(|run| run.obj_max).map_or("–".to_string(), |best| number::fixed(best, 2)),
+            run.and_then(|run| run.obj_max)
+                .map_or("–".to_string(), |best| number::fixed(best, 2)),
             share(run.and_then(|run| run.validation)),
             run.and_then(|run| run.audited)
                 .map_or("–".to_string(), |[all, good]| format!("{good} of {all}")),
             share(tested.map(|tested| tested.accuracy)),
-            interval.map_or("–".to_string(), |[low, high]| format!("{}–{}", percent(low), percent(high))),
+            interval.map_or("–".to_string(), |[low, high]| {
+                format!("{}–{}", percent(low), percent(high))
+            }),
         ]
     };
     let headers = [
@@ -161,10 +191,19 @@ pub(crate) fn differences(console: &Console, runs: &[crate::analysis::progress::
         return;
     }
     console.line("");
-    let headers: Vec<&str> = ["line", "runs"].into_iter().chain(keys.iter().map(String::as_str)).collect();
+    let headers: Vec<&str> = ["line", "runs"]
+        .into_iter()
+        .chain(keys.iter().map(String::as_str))
+        .collect();
     let row = |(number, group): (usize, &crate::analysis::progress::SettingsGroup)| {
-        let values = group.values.iter().map(|value| value.clone().unwrap_or("–".to_string()));
-        [number.to_string(), group.runs.len().to_string()].into_iter().chain(values).collect::<Vec<_>>()
+        let values = group
+            .values
+            .iter()
+            .map(|value| value.clone().unwrap_or("–".to_string()));
+        [number.to_string(), group.runs.len().to_string()]
+            .into_iter()
+            .chain(values)
+            .collect::<Vec<_>>()
     };
     console.table(&headers, &(1..).zip(&groups).map(row).collect::<Vec<_>>());
 }

@@ -11,18 +11,30 @@ const SHORT: usize = 24;
 /// headers and texts break between words. If that is not enough, the table continues below,
 /// repeating its first column. If not even two columns fit side by side, rows are stacked.
 pub(crate) fn fitted(headers: &[&str], rows: &[Vec<String>], most: usize) -> Vec<String> {
-    let columns: Vec<Column> = (0..headers.len()).map(|place| Column::new(headers, rows, place)).collect();
+    let columns: Vec<Column> = (0..headers.len())
+        .map(|place| Column::new(headers, rows, place))
+        .collect();
     let blocks = blocks(&columns, most);
     if rows.is_empty() || blocks.iter().any(|block| needed(block) > most) {
-        return if rows.is_empty() { align(headers, rows) } else { stacked(headers, rows, most) };
+        return if rows.is_empty() {
+            align(headers, rows)
+        } else {
+            stacked(headers, rows, most)
+        };
     }
-    blocks.iter().map(|block| drawn(block, &widths(block, most))).collect::<Vec<_>>().join(&String::new())
+    blocks
+        .iter()
+        .map(|block| drawn(block, &widths(block, most)))
+        .collect::<Vec<_>>()
+        .join(&String::new())
 }
 
 /// Returns the lines of a table: headers, a rule, rows; two spaces between columns, numbers to the
 /// right. Short rows are filled with empty cells; cells without a header are left out.
 pub(crate) fn align(headers: &[&str], rows: &[Vec<String>]) -> Vec<String> {
-    let columns: Vec<Column> = (0..headers.len()).map(|place| Column::new(headers, rows, place)).collect();
+    let columns: Vec<Column> = (0..headers.len())
+        .map(|place| Column::new(headers, rows, place))
+        .collect();
     let columns: Vec<&Column> = columns.iter().collect();
     drawn(&columns, &widths(&columns, usize::MAX))
 }
@@ -39,12 +51,20 @@ struct Column<'a> {
 impl<'a> Column<'a> {
     fn new(headers: &[&'a str], rows: &'a [Vec<String>], place: usize) -> Self {
         let header = headers[place];
-        let cells: Vec<&str> = rows.iter().map(|row| row.get(place).map_or("", String::as_str)).collect();
+        let cells: Vec<&str> = rows
+            .iter()
+            .map(|row| row.get(place).map_or("", String::as_str))
+            .collect();
         let is_numeric = cells.iter().any(|cell| is_number(cell))
             && cells.iter().all(|cell| is_number(cell) || is_blank(cell));
-        let widest = |of: &dyn Fn(&str) -> usize| cells.iter().map(|cell| of(cell)).max().unwrap_or(0);
+        let widest =
+            |of: &dyn Fn(&str) -> usize| cells.iter().map(|cell| of(cell)).max().unwrap_or(0);
         let whole = widest(&width);
-        let text = if is_numeric { whole } else { whole.min(SHORT).max(widest(&least_of_cell)) };
+        let text = if is_numeric {
+            whole
+        } else {
+            whole.min(SHORT).max(widest(&least_of_cell))
+        };
         Column {
             header,
             cells,
@@ -85,7 +105,11 @@ fn widths(columns: &[&Column], most: usize) -> Vec<usize> {
     for place in places {
         let more = columns[place].most - columns[place].least;
         // Only sentences benefit from a part of the width that they need.
-        let more = if columns[place].is_right && more > room { 0 } else { more.min(room) };
+        let more = if columns[place].is_right && more > room {
+            0
+        } else {
+            more.min(room)
+        };
         (widths[place], room) = (widths[place] + more, room - more);
     }
     widths
@@ -93,22 +117,44 @@ fn widths(columns: &[&Column], most: usize) -> Vec<usize> {
 
 fn drawn(columns: &[&Column], widths: &[usize]) -> Vec<String> {
     let line = |cells: Vec<&str>| {
-        let padded = cells.iter().zip(columns).zip(widths).map(|((text, column), columns)| {
-            let gap = " ".repeat(columns.saturating_sub(width(text)));
-            if column.is_right { gap + text } else { text.to_string() + &gap }
-        });
-        padded.collect::<Vec<_>>().join(&" ".repeat(GAP)).trim_end().to_string()
+        let padded = cells
+            .iter()
+            .zip(columns)
+            .zip(widths)
+            .map(|((text, column), columns)| {
+                let gap = " ".repeat(columns.saturating_sub(width(text)));
+                if column.is_right {
+                    gap + text
+                } else {
+                    text.to_string() + &gap
+                }
+            });
+        padded
+            .collect::<Vec<_>>()
+            .join(&" ".repeat(GAP))
+            .trim_end()
+            .to_string()
     };
     // A row of texts, each of several lines. Headers align at the bottom, right above their cells.
     let row = |texts: Vec<&str>, is_header: bool| -> Vec<String> {
-        let cells: Vec<Vec<String>> =
-            texts.iter().zip(widths).map(|(text, columns)| wrapped_cell(text, *columns)).collect();
+        let cells: Vec<Vec<String>> = texts
+            .iter()
+            .zip(widths)
+            .map(|(text, columns)| wrapped_cell(text, *columns))
+            .collect();
         let height = cells.iter().map(Vec::len).max().unwrap_or(1);
         let at = |cell: &'_ Vec<String>, k: usize| -> Option<usize> {
-            if is_header { (k + cell.len()).checked_sub(height) } else { Some(k) }
+            if is_header {
+                (k + cell.len()).checked_sub(height)
+            } else {
+                Some(k)
+            }
         };
         let text = |cell: &Vec<String>, k: usize| {
-            at(cell, k).and_then(|place| cell.get(place)).cloned().unwrap_or_default()
+            at(cell, k)
+                .and_then(|place| cell.get(place))
+                .cloned()
+                .unwrap_or_default()
         };
         (0..height)
             .map(|k| cells.iter().map(|cell| text(cell, k)).collect::<Vec<_>>())
@@ -116,10 +162,23 @@ fn drawn(columns: &[&Column], widths: &[usize]) -> Vec<String> {
             .collect()
     };
     let mut lines = row(columns.iter().map(|column| column.header).collect(), true);
-    lines.push(widths.iter().map(|width| "-".repeat(*width)).collect::<Vec<_>>().join(&" ".repeat(GAP)));
-    let rows = columns.iter().map(|column| column.cells.len()).max().unwrap_or(0);
+    lines.push(
+        widths
+            .iter()
+            .map(|width| "-".repeat(*width))
+            .collect::<Vec<_>>()
+            .join(&" ".repeat(GAP)),
+    );
+    let rows = columns
+        .iter()
+        .map(|column| column.cells.len())
+        .max()
+        .unwrap_or(0);
     for place in 0..rows {
-        lines.extend(row(columns.iter().map(|column| column.cells[place]).collect(), false));
+        lines.extend(row(
+            columns.iter().map(|column| column.cells[place]).collect(),
+            false,
+        ));
     }
     lines
 }
@@ -127,8 +186,17 @@ fn drawn(columns: &[&Column], widths: &[usize]) -> Vec<String> {
 /// Stacks rows, each cell behind its header, or below it if there is no room; an empty line
 /// separates rows. Empty cells are left out.
 fn stacked(headers: &[&str], rows: &[Vec<String>], most: usize) -> Vec<String> {
-    let widest = headers.iter().map(|header| width(header)).max().unwrap_or(0);
-    let longest = rows.iter().flatten().map(|cell| least_of_cell(cell)).max().unwrap_or(0);
+    let widest = headers
+        .iter()
+        .map(|header| width(header))
+        .max()
+        .unwrap_or(0);
+    let longest = rows
+        .iter()
+        .flatten()
+        .map(|cell| least_of_cell(cell))
+        .max()
+        .unwrap_or(0);
     let is_below = widest + GAP + longest > most;
     let cell = |(header, text): (&&str, &String)| -> Vec<String> {
         if is_below {
@@ -145,9 +213,17 @@ fn stacked(headers: &[&str], rows: &[Vec<String>], most: usize) -> Vec<String> {
         lines.into_iter().enumerate().map(line).collect()
     };
     let row = |row: &Vec<String>| -> Vec<String> {
-        headers.iter().zip(row).filter(|(_, text)| !text.is_empty()).flat_map(cell).collect()
+        headers
+            .iter()
+            .zip(row)
+            .filter(|(_, text)| !text.is_empty())
+            .flat_map(cell)
+            .collect()
     };
-    rows.iter().map(row).collect::<Vec<_>>().join(&String::new())
+    rows.iter()
+        .map(row)
+        .collect::<Vec<_>>()
+        .join(&String::new())
 }
 
 /// Returns true if a text starts like a number, with an optional sign, and has a digit: "−3.2",
@@ -167,7 +243,10 @@ mod tests {
     use super::*;
 
     fn rows(cells: &[&[&str]]) -> Vec<Vec<String>> {
-        cells.iter().map(|row| row.iter().map(|c| c.to_string()).collect()).collect()
+        cells
+            .iter()
+            .map(|row| row.iter().map(|c| c.to_string()).collect())
+            .collect()
     }
 
     #[test]
@@ -182,7 +261,13 @@ mod tests {
             "bb",
         ];
         assert_eq!(lines, expected);
-        assert_eq!(align(&["robot"], &[vec!["02826e9052".to_string()], vec!["1e5".to_string()]])[3], "1e5");
+        assert_eq!(
+            align(
+                &["robot"],
+                &[vec!["02826e9052".to_string()], vec!["1e5".to_string()]]
+            )[3],
+            "1e5"
+        );
     }
 
     #[test]
@@ -197,7 +282,10 @@ mod tests {
             "              it is shown a one",
             "a        100  walks",
         ];
-        assert_eq!(fitted(&["robot", "mean score", "reason"], &rows, 39), expected);
+        assert_eq!(
+            fitted(&["robot", "mean score", "reason"], &rows, 39),
+            expected
+        );
     }
 
     #[test]
@@ -217,7 +305,10 @@ mod tests {
         ];
         assert_eq!(fitted(&headers, &rows, 25), expected);
         // A cell counts with its width in a terminal.
-        assert_eq!(align(&["a", "b"], &[vec!["雪".to_string(), "x".to_string()]])[1..], ["--  -", "雪  x"]);
+        assert_eq!(
+            align(&["a", "b"], &[vec!["雪".to_string(), "x".to_string()]])[1..],
+            ["--  -", "雪  x"]
+        );
     }
 
     #[test]
@@ -247,7 +338,10 @@ mod tests {
             "task      x",
         ];
         assert_eq!(fitted(&headers, &rows, 16), expected);
-        assert_eq!(fitted(&headers, &rows, 15)[..4], ["robot", "  XFJPI", "accuracy", "  76.5 %"]);
+        assert_eq!(
+            fitted(&headers, &rows, 15)[..4],
+            ["robot", "  XFJPI", "accuracy", "  76.5 %"]
+        );
         assert_eq!(fitted(&headers, &[], 3), align(&headers, &[]));
     }
 

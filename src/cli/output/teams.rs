@@ -20,7 +20,10 @@ pub(crate) fn team(console: &Console, file: &TeamFile, out: Option<&Path>) -> Re
         None => Vec::new(),
     };
     if console.mode() == Mode::Json {
-        let without = |member: &Member| Member { displacements: Vec::new(), ..member.clone() };
+        let without = |member: &Member| Member {
+            displacements: Vec::new(),
+            ..member.clone()
+        };
         let short = |decoded: &Decoded| {
             serde_json::json!({ "accuracy": decoded.accuracy, "per_class": decoded.per_class,
             "confusion": decoded.confusion })
@@ -44,16 +47,34 @@ pub(crate) fn team(console: &Console, file: &TeamFile, out: Option<&Path>) -> Re
     let row = |member: &Member| {
         let task = member.task.clone();
         let [own, interval] = figures(&member.own);
-        vec![member.id.clone(), task, own, interval, percent(member.not_moved)]
+        vec![
+            member.id.clone(),
+            task,
+            own,
+            interval,
+            percent(member.not_moved),
+        ]
     };
-    let headers = ["robot", "task", "% of its classes", "95 % interval", "not moved %"];
+    let headers = [
+        "robot",
+        "task",
+        "% of its classes",
+        "95 % interval",
+        "not moved %",
+    ];
     console.table(&headers, &file.members.iter().map(row).collect::<Vec<_>>());
     console.line("");
     answers(console, file);
     if let Some(out) = out {
-        console.line(&format!("wrote {} and {}", out.display(), out.with_extension("csv").display()));
+        console.line(&format!(
+            "wrote {} and {}",
+            out.display(),
+            out.with_extension("csv").display()
+        ));
     }
-    pictures.iter().for_each(|path| console.line(&format!("wrote {path}")));
+    pictures
+        .iter()
+        .for_each(|path| console.line(&format!("wrote {path}")));
     Ok(())
 }
 
@@ -70,9 +91,15 @@ fn answers(console: &Console, file: &TeamFile) {
 /// Writes the confusion matrix and the poster of all bodies; returns their paths.
 fn pictures(file: &TeamFile, out: &Path) -> Result<Vec<String>, Error> {
     let mut written = Vec::new();
-    for (name, drawn) in FIGURES.into_iter().zip([plot::confusion(file), plot::poster(file)]) {
+    for (name, drawn) in FIGURES
+        .into_iter()
+        .zip([plot::confusion(file), plot::poster(file)])
+    {
         let Some(drawn) = drawn else { continue };
-        for (path, bytes) in figure(out, name).into_iter().zip([drawn.svg().into_bytes(), drawn.print()?]) {
+        for (path, bytes) in figure(out, name)
+            .into_iter()
+            .zip([drawn.svg().into_bytes(), drawn.print()?])
+        {
             write_whole(&path, &bytes)?;
             written.push(path.display().to_string());
         }

@@ -57,29 +57,65 @@ impl Depth {
 /// Returns the nearest of the 256 colours: from a cube of 6 × 6 × 6, or one of 24 grays.
 fn indexed(rgb: [u8; 3]) -> u8 {
     const LEVELS: [u8; 6] = [0, 95, 135, 175, 215, 255];
-    let distance =
-        |a: [u8; 3]| -> u32 { a.iter().zip(rgb).map(|(a, b)| u32::from(a.abs_diff(b)).pow(2)).sum() };
-    let nearest = |v: u8| (0u8..6).min_by_key(|&k| LEVELS[usize::from(k)].abs_diff(v)).unwrap_or(0);
+    let distance = |a: [u8; 3]| -> u32 {
+        a.iter()
+            .zip(rgb)
+            .map(|(a, b)| u32::from(a.abs_diff(b)).pow(2))
+            .sum()
+    };
+    let nearest = |v: u8| {
+        (0u8..6)
+            .min_by_key(|&k| LEVELS[usize::from(k)].abs_diff(v))
+            .unwrap_or(0)
+    };
     let [r, g, b] = rgb.map(nearest);
-    let cube = (distance([r, g, b].map(|k| LEVELS[usize::from(k)])), 16 + 36 * r + 6 * g + b);
-    let gray = (0u8..24).map(|k| (distance([8 + 10 * k; 3]), 232 + k)).min().unwrap_or(cube);
+    let cube = (
+        distance([r, g, b].map(|k| LEVELS[usize::from(k)])),
+        16 + 36 * r + 6 * g + b,
+    );
+    let gray = (0u8..24)
+        .map(|k| (distance([8 + 10 * k; 3]), 232 + k))
+        .min()
+        .unwrap_or(cube);
     if gray.0 < cube.0 { gray.1 } else { cube.1 }
 }
 
 /// Renders a frame as `rows` lines of exactly `columns` characters, joined by newlines: a line of
 /// read-outs, then the world, with a moving camera. With colours, a character has two pixels (half
 /// blocks). In ASCII, `#` is rigid, `:` soft, `/` and `\` muscles, `-` and `+` sensors.
-pub(crate) fn frame(walk: &Walk, frame: usize, columns: usize, rows: usize, depth: Depth) -> String {
+pub(crate) fn frame(
+    walk: &Walk,
+    frame: usize,
+    columns: usize,
+    rows: usize,
+    depth: Depth,
+) -> String {
     let colour = depth != Depth::Plain;
     let (columns, rows) = (columns.min(1000), rows.min(1000));
     let words = readout(walk, frame);
-    let status = format!("{}  {}  {}  {}", words.label, words.time, words.displacement, words.verdict);
-    let status = if colour { status } else { status.replace(['·', '−'], "-").replace(['←', '→'], "") };
-    let shown = status.chars().map(|c| if c.is_control() || (!colour && !c.is_ascii()) { '?' } else { c });
+    let status = format!(
+        "{}  {}  {}  {}",
+        words.label, words.time, words.displacement, words.verdict
+    );
+    let status = if colour {
+        status
+    } else {
+        status.replace(['·', '−'], "-").replace(['←', '→'], "")
+    };
+    let shown = status.chars().map(|c| {
+        if c.is_control() || (!colour && !c.is_ascii()) {
+            '?'
+        } else {
+            c
+        }
+    });
     let status: String = shown.chain(std::iter::repeat(' ')).take(columns).collect();
     // A character is about twice as high as wide.
-    let (height, tall) =
-        if colour { (2 * rows.saturating_sub(1), 1.0) } else { (rows.saturating_sub(1), 2.0) };
+    let (height, tall) = if colour {
+        (2 * rows.saturating_sub(1), 1.0)
+    } else {
+        (rows.saturating_sub(1), 2.0)
+    };
     let pixels = pixels(walk, frame, columns, height, tall);
     let mut lines = vec![status];
     let at = |r: usize, c: usize| pixels.get(r * columns + c).copied().unwrap_or(Pixel::Sky);
@@ -107,7 +143,10 @@ fn pixels(walk: &Walk, frame: usize, columns: usize, rows: usize, tall: f64) -> 
         return vec![];
     }
     let first = walk.extent(0..1);
-    let (width, top) = ((first.right - first.left).clamp(1.0, 128.0), first.top.clamp(1.0, 128.0));
+    let (width, top) = (
+        (first.right - first.left).clamp(1.0, 128.0),
+        first.top.clamp(1.0, 128.0),
+    );
     let ground = 1 + rows / 16;
     // Pixels per voxel length: the robot, as much free ground beside it, and some sky above.
     let scale = (columns as f64 / (2.0 * width + 4.0))
@@ -127,7 +166,8 @@ fn pixels(walk: &Walk, frame: usize, columns: usize, rows: usize, tall: f64) -> 
         let bounds = |k: usize, most: usize| {
             let low = place.iter().map(|p| p[k]).fold(f64::INFINITY, f64::min);
             let high = place.iter().map(|p| p[k]).fold(f64::NEG_INFINITY, f64::max);
-            low.floor().clamp(0.0, most as f64) as usize..high.ceil().clamp(0.0, most as f64) as usize
+            low.floor().clamp(0.0, most as f64) as usize
+                ..high.ceil().clamp(0.0, most as f64) as usize
         };
         for row in bounds(1, surface) {
             for column in bounds(0, columns) {
@@ -196,7 +236,10 @@ mod tests {
         let strip = |line: &str| {
             let mut pieces = line.split('\x1b');
             let first = pieces.next().map_or(0, |p| p.chars().count());
-            first + pieces.map(|p| p.split_once('m').map_or(0, |(_, t)| t.chars().count())).sum::<usize>()
+            first
+                + pieces
+                    .map(|p| p.split_once('m').map_or(0, |(_, t)| t.chars().count()))
+                    .sum::<usize>()
         };
         text.split('\n').map(strip).collect()
     }
@@ -226,7 +269,13 @@ mod tests {
         assert_eq!(Depth::of(true, "", "xterm-256color"), Depth::Indexed);
         assert_eq!(Depth::of(false, "truecolor", "xterm"), Depth::Plain);
         assert_eq!(Depth::of(true, "truecolor", "dumb"), Depth::Plain);
-        let colours = [[0, 0, 0], [255, 255, 255], [255, 0, 0], [118, 118, 118], [200, 36, 58]];
+        let colours = [
+            [0, 0, 0],
+            [255, 255, 255],
+            [255, 0, 0],
+            [118, 118, 118],
+            [200, 36, 58],
+        ];
         assert_eq!(colours.map(indexed), [16, 231, 196, 243, 161]);
     }
 

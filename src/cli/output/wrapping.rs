@@ -33,7 +33,10 @@ enum Kind {
 pub(crate) fn width(text: &str) -> usize {
     let mut parts = text.split('\x1b');
     let first = parts.next().map_or(0, UnicodeWidthStr::width);
-    first + parts.map(|part| part.split_once('m').map_or(0, |(_, seen)| seen.width())).sum::<usize>()
+    first
+        + parts
+            .map(|part| part.split_once('m').map_or(0, |(_, seen)| seen.width()))
+            .sum::<usize>()
 }
 
 /// Wraps a one-line text and indents the continuation. Text in backticks is a command.
@@ -60,15 +63,25 @@ pub(crate) fn wrapped_cell(text: &str, columns: usize) -> Vec<String> {
 
 /// Returns the minimum columns of a table cell.
 pub(crate) fn least_of_cell(text: &str) -> usize {
-    words(text, Kind::Cell).iter().map(|word| width(&word.text)).max().unwrap_or(0)
+    words(text, Kind::Cell)
+        .iter()
+        .map(|word| width(&word.text))
+        .max()
+        .unwrap_or(0)
 }
 
 /// Joins a label and parts in one line: the first part always, later ones if they fit. A label that
 /// is too long keeps its beginning and end.
 pub(crate) fn one_of(label: &str, parts: &[String], columns: usize) -> String {
-    let (first, others) = parts.split_first().map_or(("", parts), |(first, others)| (first, others));
+    let (first, others) = parts
+        .split_first()
+        .map_or(("", parts), |(first, others)| (first, others));
     let label = shortened(label, columns.saturating_sub(width(first) + 1));
-    let mut line = if label.is_empty() { first.to_string() } else { format!("{label} {first}") };
+    let mut line = if label.is_empty() {
+        first.to_string()
+    } else {
+        format!("{label} {first}")
+    };
     for part in others {
         let longer = format!("{line} · {part}");
         if width(&longer) > columns {
@@ -89,13 +102,21 @@ fn shortened(text: &str, columns: usize) -> String {
     match width(text) <= columns {
         true => text.to_string(),
         // Characters may be two columns wide.
-        false => (1..=columns / 2).rev().map(ends).find(|short| width(short) <= columns).unwrap_or_default(),
+        false => (1..=columns / 2)
+            .rev()
+            .map(ends)
+            .find(|short| width(short) <= columns)
+            .unwrap_or_default(),
     }
 }
 
 /// Splits a text into words. A per cent sign stays with its number, or with what follows it.
 fn words(text: &str, kind: Kind) -> Vec<Word> {
-    let least_gap = if kind == Kind::Cell && text.contains("  ") { 2 } else { 1 };
+    let least_gap = if kind == Kind::Cell && text.contains("  ") {
+        2
+    } else {
+        1
+    };
     let (mut is_command, mut quote) = (kind == Kind::Command, None);
     let mut words: Vec<Word> = Vec::new();
     let (mut gap, mut is_escaped) = (0, false);
@@ -108,7 +129,11 @@ fn words(text: &str, kind: Kind) -> Vec<Word> {
         let is_glued = gap < least_gap || gap == 1 && !is_command && (c == '%' || begins_with_sign);
         match words.last_mut().filter(|_| is_glued) {
             Some(word) => word.text.extend(std::iter::repeat_n(' ', gap).chain([c])),
-            None => words.push(Word { gap, text: c.to_string(), continues: is_command }),
+            None => words.push(Word {
+                gap,
+                text: c.to_string(),
+                continues: is_command,
+            }),
         }
         gap = 0;
         match c {
@@ -130,7 +155,11 @@ fn fill(words: &[Word], indent: usize, columns: usize) -> Vec<String> {
     let mut line = String::new();
     let mut rest = words;
     while let Some(first) = rest.first() {
-        let end = rest.iter().skip(1).position(|word| !word.continues).map_or(rest.len(), |place| place + 1);
+        let end = rest
+            .iter()
+            .skip(1)
+            .position(|word| !word.continues)
+            .map_or(rest.len(), |place| place + 1);
         let (unit, others) = rest.split_at(end);
         rest = others;
         let whole: usize = unit.iter().map(|word| word.gap + width(&word.text)).sum();
@@ -142,7 +171,11 @@ fn fill(words: &[Word], indent: usize, columns: usize) -> Vec<String> {
         }
         for (place, word) in unit.iter().enumerate() {
             let goes_on = place + 1 < unit.len();
-            let more = if goes_on && is_broken(unit, place, &line, columns) { width(GOES_ON) } else { 0 };
+            let more = if goes_on && is_broken(unit, place, &line, columns) {
+                width(GOES_ON)
+            } else {
+                0
+            };
             let is_begun = !line.trim().is_empty();
             if is_begun && width(&line) + word.gap + width(&word.text) + more > columns {
                 let end = if word.continues { GOES_ON } else { "" };
@@ -159,7 +192,10 @@ fn fill(words: &[Word], indent: usize, columns: usize) -> Vec<String> {
 
 /// Returns true if the rest of a command, from a word on, does not fit into the line.
 fn is_broken(unit: &[Word], place: usize, line: &str, columns: usize) -> bool {
-    let left: usize = unit[place..].iter().map(|word| word.gap + width(&word.text)).sum();
+    let left: usize = unit[place..]
+        .iter()
+        .map(|word| word.gap + width(&word.text))
+        .sum();
     width(line) + left > columns
 }
 
@@ -171,37 +207,69 @@ mod tests {
     #[test]
     fn lines_break_between_words_only() {
         assert_eq!(wrapped("a text that fits", 16), ["a text that fits"]);
-        assert_eq!(wrapped("a text that fits not", 16), ["a text that fits", "  not"]);
-        assert_eq!(wrapped("  far: 12.5 % of it", 13), ["  far: 12.5 %", "    of it"]);
+        assert_eq!(
+            wrapped("a text that fits not", 16),
+            ["a text that fits", "  not"]
+        );
+        assert_eq!(
+            wrapped("  far: 12.5 % of it", 13),
+            ["  far: 12.5 %", "    of it"]
+        );
         assert_eq!(wrapped("one  two  three", 9), ["one  two", "  three"]);
-        assert_eq!(wrapped("a long/path/of/many/folders b", 10), ["a", "  long/path/of/many/folders", "  b"]);
+        assert_eq!(
+            wrapped("a long/path/of/many/folders b", 10),
+            ["a", "  long/path/of/many/folders", "  b"]
+        );
         assert_eq!(wrapped("", 10), [""]);
         assert_eq!(wrapped("雪雪 雪雪", 8), ["雪雪", "  雪雪"]);
-        assert_eq!(wrapped_cell("some words of a cell", 10), ["some words", "of a cell"]);
+        assert_eq!(
+            wrapped_cell("some words of a cell", 10),
+            ["some words", "of a cell"]
+        );
         assert_eq!(wrapped_cell("% of 0", 3), ["% of", "0"]);
         // Nothing fits, and nothing is lost.
         for columns in [0, 1, 2, 3] {
-            assert_eq!(wrapped("ab `cd ef` g", columns).join("").replace([' ', '\\'], ""), "ab`cdef`g");
+            assert_eq!(
+                wrapped("ab `cd ef` g", columns)
+                    .join("")
+                    .replace([' ', '\\'], ""),
+                "ab`cdef`g"
+            );
         }
     }
 
     #[test]
     fn one_line_leaves_out_what_matters_least() {
         let parts = ["3/9 runs", "5 s left", "1 run/s"].map(str::to_string);
-        assert_eq!(one_of("all:", &parts, 99), "all: 3/9 runs · 5 s left · 1 run/s");
+        assert_eq!(
+            one_of("all:", &parts, 99),
+            "all: 3/9 runs · 5 s left · 1 run/s"
+        );
         assert_eq!(one_of("all:", &parts, 33), "all: 3/9 runs · 5 s left");
         assert_eq!(one_of("雪雪雪雪雪雪雪雪:", &parts, 18), "雪雪…雪: 3/9 runs");
         assert_eq!(one_of("all:", &parts, 24), "all: 3/9 runs · 5 s left");
-        assert_eq!([one_of("all:", &parts, 11), one_of("all:", &parts, 0)], ["3/9 runs"; 2]);
-        assert_eq!(one_of("a_name_of_many_letters:", &parts, 20), "a_nam…ters: 3/9 runs");
+        assert_eq!(
+            [one_of("all:", &parts, 11), one_of("all:", &parts, 0)],
+            ["3/9 runs"; 2]
+        );
+        assert_eq!(
+            one_of("a_name_of_many_letters:", &parts, 20),
+            "a_nam…ters: 3/9 runs"
+        );
     }
 
     #[test]
     fn a_command_is_whole_in_a_line_or_goes_on_after_a_backslash() {
         let hint = "hint: `audit --archive run` makes all eligible";
         assert_eq!(wrapped(hint, 46), [hint]);
-        assert_eq!(wrapped(hint, 30), ["hint: `audit --archive run`", "  makes all eligible"]);
-        assert_eq!(wrapped(hint, 26), ["hint:", "  `audit --archive run`", "  makes all eligible"]);
+        assert_eq!(
+            wrapped(hint, 30),
+            ["hint: `audit --archive run`", "  makes all eligible"]
+        );
+        assert_eq!(
+            wrapped(hint, 26),
+            ["hint:", "  `audit --archive run`", "  makes all eligible"]
+        );
         assert_eq!(
             wrapped("hint: `audit --archive run` it", 17),
             ["hint: `audit \\", "  --archive run`", "  it"]
@@ -210,8 +278,14 @@ mod tests {
         assert_eq!(next(32), ["next: audit --archive 'a b' -n 3"]);
         assert_eq!(next(31), ["next:", "  audit --archive 'a b' -n 3"]);
         assert_eq!(next(24), ["next: audit --archive \\", "  'a b' -n 3"]);
-        assert_eq!(wrapped_command("     ", "audit -a run", 20), ["      audit -a run"]);
+        assert_eq!(
+            wrapped_command("     ", "audit -a run", 20),
+            ["      audit -a run"]
+        );
         let quoted = quoted("it's here/a b");
-        assert_eq!(wrapped_command("next:", &format!("eval -a {quoted}"), 26)[1..], [format!("  {quoted}")]);
+        assert_eq!(
+            wrapped_command("next:", &format!("eval -a {quoted}"), 26)[1..],
+            [format!("  {quoted}")]
+        );
     }
 }

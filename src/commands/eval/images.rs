@@ -85,7 +85,13 @@ impl<'a> HeldOutImages<'a> {
                 see(&source.run.config, dataset, split, first.index)?;
             }
         }
-        Ok(HeldOutImages { config, dataset, draw, images, stimuli })
+        Ok(HeldOutImages {
+            config,
+            dataset,
+            draw,
+            images,
+            stimuli,
+        })
     }
 
     /// Returns the images as robots of a run see them, in order.
@@ -95,7 +101,9 @@ impl<'a> HeldOutImages<'a> {
     pub(crate) fn seen_by(&self, config: &Config) -> Result<Cow<'_, [Grid<f64>]>, Error> {
         match config.stimulus == self.config.stimulus {
             true => Ok(Cow::Borrowed(&self.stimuli)),
-            false => see_all(config, self.dataset, self.draw.split.split(), &self.images).map(Cow::Owned),
+            false => {
+                see_all(config, self.dataset, self.draw.split.split(), &self.images).map(Cow::Owned)
+            }
         }
     }
 
@@ -110,7 +118,10 @@ impl<'a> HeldOutImages<'a> {
     ) -> Result<BTreeMap<String, Baselines>, Error> {
         let seen = |images: &[ImageRef]| -> Result<Vec<(Grid<f64>, u8)>, Error> {
             let stimulus = |index| see(self.config, self.dataset, Split::Train, index);
-            images.iter().map(|image| Ok((stimulus(image.index)?, image.label))).collect()
+            images
+                .iter()
+                .map(|image| Ok((stimulus(image.index)?, image.label)))
+                .collect()
         };
         let choice = seen(&self.pixel_images()?)?;
         // In another dataset, the indices of training images mean other images.
@@ -121,10 +132,16 @@ impl<'a> HeldOutImages<'a> {
             let own = own.map_err(|error| error.in_place("training_images").in_place(&path))?;
             Ok((source.run.config.grouping()?, own))
         });
-        let of_runs = is_own.then(|| of_runs.collect::<Result<Vec<_>, Error>>()).transpose()?;
+        let of_runs = is_own
+            .then(|| of_runs.collect::<Result<Vec<_>, Error>>())
+            .transpose()?;
         let shown = self.stimuli.iter().zip(&self.images);
-        let shown: Vec<LabelledImage> =
-            shown.map(|(stimulus, image)| LabelledImage { stimulus, class: image.label }).collect();
+        let shown: Vec<LabelledImage> = shown
+            .map(|(stimulus, image)| LabelledImage {
+                stimulus,
+                class: image.label,
+            })
+            .collect();
         let mut all = BTreeMap::new();
         for (name, task) in tasks {
             if all.contains_key(name) {
@@ -133,8 +150,11 @@ impl<'a> HeldOutImages<'a> {
             let rule = best_pixel(task, &labelled(&choice));
             let nearest_of_all = of_runs.as_ref().map(|all| {
                 // The mean over the runs that have the task.
-                let having = all.iter().filter(|(grouping, _)| grouping.tasks().contains(task));
-                let nearest = having.map(|(_, own)| nearest_training_image(task, &labelled(own), &shown));
+                let having = all
+                    .iter()
+                    .filter(|(grouping, _)| grouping.tasks().contains(task));
+                let nearest =
+                    having.map(|(_, own)| nearest_training_image(task, &labelled(own), &shown));
                 let nearest: Vec<f64> = nearest.collect();
                 nearest.iter().sum::<f64>() / nearest.len() as f64
             });
@@ -157,8 +177,14 @@ impl<'a> HeldOutImages<'a> {
         };
         let mut choice = Vec::new();
         for label in self.config.classes() {
-            let count = self.dataset.indices_of(Split::Train, label).len().min(PIXEL_IMAGES_PER_CLASS);
-            let drawn = self.dataset.draw(Split::Train, &[label], count, self.draw.seed);
+            let count = self
+                .dataset
+                .indices_of(Split::Train, label)
+                .len()
+                .min(PIXEL_IMAGES_PER_CLASS);
+            let drawn = self
+                .dataset
+                .draw(Split::Train, &[label], count, self.draw.seed);
             let drawn = drawn.map_err(|error| Error::input(error.to_string()))?;
             let others = drawn.into_iter().filter(|index| !shown.contains(index));
             choice.extend(others.map(|index| ImageRef { index, label }));
@@ -176,7 +202,12 @@ fn taught_with(run: &RunFile, dataset: &Dataset) -> Result<Vec<ImageRef>, Error>
 }
 
 fn labelled(list: &[(Grid<f64>, u8)]) -> Vec<LabelledImage<'_>> {
-    list.iter().map(|(stimulus, class)| LabelledImage { stimulus, class: *class }).collect()
+    list.iter()
+        .map(|(stimulus, class)| LabelledImage {
+            stimulus,
+            class: *class,
+        })
+        .collect()
 }
 
 /// Returns the validation images that choose the robots of each run, `count` per run.

@@ -56,9 +56,22 @@ pub(crate) fn check_data<'a>(
             Run::Evolve(config, ..) => (&**config, given),
             Run::Train(training) => (&training.config, given.and_of(&training.archive)),
         };
-        let test = task.steps.eval.as_ref().filter(|step| step.split == HeldOut::Test);
-        let splits = if test.is_some() { &Split::ALL[..] } else { &[Split::Train] };
-        let DataConfig { dataset, dir, builtin, .. } = &config.data;
+        let test = task
+            .steps
+            .eval
+            .as_ref()
+            .filter(|step| step.split == HeldOut::Test);
+        let splits = if test.is_some() {
+            &Split::ALL[..]
+        } else {
+            &[Split::Train]
+        };
+        let DataConfig {
+            dataset,
+            dir,
+            builtin,
+            ..
+        } = &config.data;
         let name = format!("{:?}", (splits, dataset, dir, builtin, &whereabouts));
         let dataset = match datasets.entry(name.clone()) {
             Entry::Occupied(loaded) => loaded.into_mut(),
@@ -78,7 +91,8 @@ pub(crate) fn check_data<'a>(
                     .map_err(named)?;
             }
         }
-        let Some(step) = test.filter(|step| known.insert((name, step.images, config.classes()))) else {
+        let Some(step) = test.filter(|step| known.insert((name, step.images, config.classes())))
+        else {
             continue;
         };
         check_test(config, dataset, step.images, "eval.images").map_err(named)?;
@@ -94,7 +108,9 @@ pub(crate) fn check_test(
     key: &str,
 ) -> Result<(), Error> {
     let drawn = held_out::test_images(&config.classes(), dataset, images, 1);
-    drawn.map(|_| ()).map_err(|error| error.in_place(&format!("{key} = {images}")))
+    drawn
+        .map(|_| ())
+        .map_err(|error| error.in_place(&format!("{key} = {images}")))
 }
 
 /// Runs all tasks, `jobs` at once; `None`: one per core. A failing task does not stop others.
@@ -108,10 +124,13 @@ pub(crate) fn run_all(
     session: &Session,
 ) -> Result<TasksSummary, Error> {
     let is_open = |task: &&Task| {
-        let known = TaskFile::read(&place.folder(task).join(TASK_JSON)).ok().flatten();
+        let known = TaskFile::read(&place.folder(task).join(TASK_JSON))
+            .ok()
+            .flatten();
         !is_done(known.as_ref(), task, place)
     };
-    let numbered: Vec<(usize, &Task)> = (1..).zip(tasks).filter(|(_, task)| is_open(task)).collect();
+    let numbered: Vec<(usize, &Task)> =
+        (1..).zip(tasks).filter(|(_, task)| is_open(task)).collect();
     check_data(numbered.iter().copied(), place, session.folder())?;
     std::fs::create_dir_all(&place.out).map_err(|error| Error::writing(&place.out, &error))?;
     let before = tasks.len() - numbered.len();
@@ -119,19 +138,36 @@ pub(crate) fn run_all(
     let threads = session.threads.unwrap_or_else(cores);
     let jobs = jobs.unwrap_or(threads).min(numbered.len()).max(1);
     let threads = Some((threads / jobs).max(1));
-    let sum = |tasks: &mut dyn Iterator<Item = &Task>| tasks.map(Task::amount).fold(0, u64::saturating_add);
+    let sum = |tasks: &mut dyn Iterator<Item = &Task>| {
+        tasks.map(Task::amount).fold(0, u64::saturating_add)
+    };
     let total = sum(&mut tasks.iter());
     let known = total - sum(&mut numbered.iter().map(|(_, task)| *task));
     if !numbered.is_empty() {
-        let label =
-            format!("{} of {}, {jobs} at once:", numbered.len(), counted(tasks.len(), "task", "tasks"));
+        let label = format!(
+            "{} of {}, {jobs} at once:",
+            numbered.len(),
+            counted(tasks.len(), "task", "tasks")
+        );
         let train = tasks.iter().all(|task| matches!(task.run, Run::Train(_)));
         let unit = if train { "challengers" } else { "generations" };
-        session.observer.begins(&Work { label, total, known, unit });
+        session.observer.begins(&Work {
+            label,
+            total,
+            known,
+            unit,
+        });
     }
-    let all = All { session, known, parts: numbered.iter().map(|_| AtomicU64::new(0)).collect() };
+    let all = All {
+        session,
+        known,
+        parts: numbered.iter().map(|_| AtomicU64::new(0)).collect(),
+    };
     let next = AtomicUsize::new(0);
-    let summary = Mutex::new(TasksSummary { done: before, ..TasksSummary::default() });
+    let summary = Mutex::new(TasksSummary {
+        done: before,
+        ..TasksSummary::default()
+    });
     // Tasks that other processes worked on.
     let elsewhere: Mutex<Vec<&Task>> = Mutex::new(Vec::new());
     let worker = || {
@@ -141,11 +177,20 @@ pub(crate) fn run_all(
                 break;
             };
             let has_begun = AtomicBool::new(false);
-            let part = Part { all: &all, index, amount: task.amount(), name: &task.name, has_begun };
-            let ended =
-                catch_unwind(AssertUnwindSafe(|| run(task, place, &session.watched(&part).threads(threads))));
+            let part = Part {
+                all: &all,
+                index,
+                amount: task.amount(),
+                name: &task.name,
+                has_begun,
+            };
+            let ended = catch_unwind(AssertUnwindSafe(|| {
+                run(task, place, &session.watched(&part).threads(threads))
+            }));
             let ended = ended.unwrap_or_else(|_| {
-                Err(Error::other("a bug of morphcog; what it said stands above".to_string()))
+                Err(Error::other(
+                    "a bug of morphcog; what it said stands above".to_string(),
+                ))
             });
             let mut summary = summary.lock().unwrap_or_else(PoisonError::into_inner);
             match ended {
@@ -162,12 +207,16 @@ pub(crate) fn run_all(
                 }
                 Err(error) if error.kind == ErrorKind::Stopped => {}
                 Err(error) if error.kind == ErrorKind::Occupied => {
-                    elsewhere.lock().unwrap_or_else(PoisonError::into_inner).push(*task);
+                    elsewhere
+                        .lock()
+                        .unwrap_or_else(PoisonError::into_inner)
+                        .push(*task);
                 }
                 Err(error) => {
-                    session
-                        .observer
-                        .failed(&error.in_place(&format!("task {number} ({}) failed", task.name)), "");
+                    session.observer.failed(
+                        &error.in_place(&format!("task {number} ({}) failed", task.name)),
+                        "",
+                    );
                     summary.failed.push(*number);
                 }
             }
@@ -177,7 +226,9 @@ pub(crate) fn run_all(
     let mut summary = summary.into_inner().unwrap_or_else(PoisonError::into_inner);
     summary.failed.sort_unstable();
     // Some of them may be done by now.
-    let elsewhere = elsewhere.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let elsewhere = elsewhere
+        .into_inner()
+        .unwrap_or_else(PoisonError::into_inner);
     summary.elsewhere = elsewhere.iter().filter(|task| is_open(task)).count();
     summary.done += elsewhere.len() - summary.elsewhere;
     summary.open = tasks.len() - summary.done - summary.failed.len() - summary.elsewhere;
@@ -212,10 +263,16 @@ impl Part<'_, '_> {
     }
 
     fn is_at(&self, done: u64) {
-        let All { session, known, parts } = self.all;
+        let All {
+            session,
+            known,
+            parts,
+        } = self.all;
         parts[self.index].fetch_max(done.min(self.amount), Ordering::Relaxed);
         let done = parts.iter().map(|part| part.load(Ordering::Relaxed));
-        session.observer.progress(done.fold(*known, u64::saturating_add));
+        session
+            .observer
+            .progress(done.fold(*known, u64::saturating_add));
     }
 }
 
@@ -233,6 +290,9 @@ impl Observer for Part<'_, '_> {
     }
 
     fn warning(&self, text: &str) {
-        self.all.session.observer.warning(&format!("{}: {text}", self.name));
+        self.all
+            .session
+            .observer
+            .warning(&format!("{}: {text}", self.name));
     }
 }

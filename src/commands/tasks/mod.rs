@@ -10,4 +10,6 @@ pub(crate) mod task;
 pub(crate) use all::{TasksSummary, check_data, run_all};
 pub(crate) use status::{TaskStatus, status};
 pub(crate) use steps::run;
-pub(crate) use task::{AuditStep, EvalStep, Run, Steps, Task, TaskFolders, TrainRun, check_folders};
+pub(crate) use task::{
+    AuditStep, EvalStep, Run, Steps, Task, TaskFolders, TrainRun, check_folders,
+};

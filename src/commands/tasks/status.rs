@@ -38,16 +38,25 @@ pub(crate) struct TaskStatus {
 /// # Errors
 /// Returns an error if a folder cannot be read.
 pub(crate) fn status(tasks: &[Task], place: &TaskFolders) -> Result<Vec<TaskStatus>, Error> {
-    let locks: Vec<PathBuf> = tasks.iter().map(|task| place.folder(task).join(TASK_LOCK)).collect();
+    let locks: Vec<PathBuf> = tasks
+        .iter()
+        .map(|task| place.folder(task).join(TASK_LOCK))
+        .collect();
     let mut all = Vec::new();
     for ((number, task), held) in (1..).zip(tasks).zip(lock::states(&locks)) {
         all.push(status_of(number, task, place, held)?);
     }
     // A task about which nothing else is known takes as long as the finished ones.
-    let done: Vec<f64> =
-        all.iter().filter(|s| s.state == TaskState::Done).filter_map(|s| s.seconds).collect();
+    let done: Vec<f64> = all
+        .iter()
+        .filter(|s| s.state == TaskState::Done)
+        .filter_map(|s| s.seconds)
+        .collect();
     let mean = (!done.is_empty()).then(|| done.iter().sum::<f64>() / done.len() as f64);
-    for status in all.iter_mut().filter(|s| s.state != TaskState::Done && s.seconds_left.is_none()) {
+    for status in all
+        .iter_mut()
+        .filter(|s| s.state != TaskState::Done && s.seconds_left.is_none())
+    {
         status.seconds_left = mean.map(|mean| (mean - status.seconds.unwrap_or(0.0)).max(0.0));
     }
     Ok(all)
@@ -62,22 +71,38 @@ fn status_of(
     let folder = place.folder(task);
     let known = TaskFile::read(&folder.join(TASK_JSON))?;
     let (state, about) = match (&known, held) {
-        (_, lock::LockState::Held(holder)) => (TaskState::Running, holder.map(|holder| holder.to_string())),
+        (_, lock::LockState::Held(holder)) => {
+            (TaskState::Running, holder.map(|holder| holder.to_string()))
+        }
         (None, _) => (TaskState::Waiting, None),
         (Some(known), _) if was_done(known, task) => match lacking(task, place) {
             None => (TaskState::Done, None),
             lacking => (TaskState::Stopped, lacking),
         },
-        (Some(TaskFile { state: TaskState::Failed, error, .. }), _) => (TaskState::Failed, error.clone()),
-        (Some(TaskFile { state: TaskState::Running, .. }), lock::LockState::Stale(holder)) => {
-            (TaskState::Stopped, Some(format!("{holder} was ended")))
-        }
+        (
+            Some(TaskFile {
+                state: TaskState::Failed,
+                error,
+                ..
+            }),
+            _,
+        ) => (TaskState::Failed, error.clone()),
+        (
+            Some(TaskFile {
+                state: TaskState::Running,
+                ..
+            }),
+            lock::LockState::Stale(holder),
+        ) => (TaskState::Stopped, Some(format!("{holder} was ended"))),
         (Some(_), _) => (TaskState::Stopped, None),
     };
     let (generations, of_run) = match &task.run {
         Run::Evolve(config, ..) => {
             let (done, seconds) = last_generation(&folder.join(METRICS)).unwrap_or((0, 0.0));
-            (Some([done, config.generations]), Some((done, seconds)).filter(|_| state != TaskState::Waiting))
+            (
+                Some([done, config.generations]),
+                Some((done, seconds)).filter(|_| state != TaskState::Waiting),
+            )
         }
         Run::Train(_) => (None, None),
     };
@@ -90,8 +115,20 @@ fn status_of(
         let todo = task.amount().saturating_sub(done);
         (done > 0 && todo > 0).then(|| seconds * todo as f64 / done as f64)
     };
-    let seconds_left = if state == TaskState::Done { Some(0.0) } else { of_run.and_then(left) };
-    Ok(TaskStatus { task: number, name: task.name.clone(), state, generations, seconds, seconds_left, about })
+    let seconds_left = if state == TaskState::Done {
+        Some(0.0)
+    } else {
+        of_run.and_then(left)
+    };
+    Ok(TaskStatus {
+        task: number,
+        name: task.name.clone(),
+        state,
+        generations,
+        seconds,
+        seconds_left,
+        about,
+    })
 }
 
 /// Reads generations and wall-clock time \[s\] at the end of a metrics.csv, which may have
@@ -99,11 +136,15 @@ fn status_of(
 fn last_generation(path: &Path) -> Option<(u64, f64)> {
     let mut file = open_file(path).ok()?;
     let length = file.metadata().ok()?.len();
-    file.seek(SeekFrom::Start(length.saturating_sub(ROW))).ok()?;
+    file.seek(SeekFrom::Start(length.saturating_sub(ROW)))
+        .ok()?;
     let mut text = Vec::new();
     file.read_to_end(&mut text).ok()?;
     let text = String::from_utf8_lossy(&text);
-    let line = text.split_inclusive('\n').rfind(|line| line.ends_with('\n'))?.trim_end();
+    let line = text
+        .split_inclusive('\n')
+        .rfind(|line| line.ends_with('\n'))?
+        .trim_end();
     let generation: u64 = line.split(',').next()?.parse().ok()?;
     Some((generation + 1, line.rsplit(',').next()?.parse().ok()?))
 }

@@ -58,15 +58,19 @@ pub(super) fn is_done(known: Option<&TaskFile>, task: &Task, place: &TaskFolders
 
 /// Returns true if a task's file says that all of it is done.
 pub(super) fn was_done(known: &TaskFile, task: &Task) -> bool {
-    known.state == TaskState::Done && known.settings == task.settings() && known.asked == task.asked()
+    known.state == TaskState::Done
+        && known.settings == task.settings()
+        && known.asked == task.asked()
 }
 
 /// Returns the part of a finished task that is missing or not its own: the reason to redo it.
 pub(super) fn lacking(task: &Task, place: &TaskFolders) -> Option<String> {
     let folder = place.folder(task);
     let audit = task.steps.audit.as_ref().map(|_| AUDIT_JSON);
-    if let Some(name) =
-        [Some(RUN_JSON), audit].into_iter().flatten().find(|name| !folder.join(name).is_file())
+    if let Some(name) = [Some(RUN_JSON), audit]
+        .into_iter()
+        .flatten()
+        .find(|name| !folder.join(name).is_file())
     {
         return Some(format!("{name} is missing"));
     }
@@ -85,7 +89,10 @@ pub(super) fn lacking(task: &Task, place: &TaskFolders) -> Option<String> {
 ///
 /// # Errors
 /// Returns an error if its selection of robots cannot be read.
-pub(crate) fn test_of(task: &Task, place: &TaskFolders) -> Result<Option<eval::EvalOptions>, Error> {
+pub(crate) fn test_of(
+    task: &Task,
+    place: &TaskFolders,
+) -> Result<Option<eval::EvalOptions>, Error> {
     let Some(step) = &task.steps.eval else {
         return Ok(None);
     };
@@ -107,8 +114,9 @@ pub(crate) fn test_of(task: &Task, place: &TaskFolders) -> Result<Option<eval::E
 /// Does the run and the steps after it, unless they are done.
 fn steps(task: &Task, place: &TaskFolders, session: &Session) -> Result<(), Error> {
     let folder = place.folder(task);
-    let stopped =
-        || Error::stopped("stopped; what is done so far is kept".to_string()).remedy(Remedy::Repeat);
+    let stopped = || {
+        Error::stopped("stopped; what is done so far is kept".to_string()).remedy(Remedy::Repeat)
+    };
     match &task.run {
         Run::Evolve(config, name, _) => {
             let options = evolve::EvolveOptions {
@@ -146,7 +154,10 @@ fn steps(task: &Task, place: &TaskFolders, session: &Session) -> Result<(), Erro
     if let Some(step) = &task.steps.audit {
         let robots = match selection("audit.robots", &step.robots)? {
             Selection::Validated(best) => {
-                let options = validation::ValidationOptions { archive: archive.clone(), best: Some(best) };
+                let options = validation::ValidationOptions {
+                    archive: archive.clone(),
+                    best: Some(best),
+                };
                 let found = validation::validate(&options, session)?.ok_or_else(stopped)?;
                 Selection::Ids(found.into_iter().map(|robot| robot.id).collect())
             }
@@ -187,13 +198,24 @@ fn of_task(error: Error) -> Error {
         _ => false,
     });
     if is_in_the_way {
-        let error = Error { kind: ErrorKind::Input, remedies: Vec::new(), ..error };
+        let error = Error {
+            kind: ErrorKind::Input,
+            remedies: Vec::new(),
+            ..error
+        };
         return error.remedy(Remedy::MoveAway).remedy(Remedy::ChooseOut);
     }
     let by_itself = |remedy| {
-        if remedy == Remedy::RepeatResuming { Remedy::Repeat } else { remedy }
+        if remedy == Remedy::RepeatResuming {
+            Remedy::Repeat
+        } else {
+            remedy
+        }
     };
-    Error { remedies: error.remedies.into_iter().map(by_itself).collect(), ..error }
+    Error {
+        remedies: error.remedies.into_iter().map(by_itself).collect(),
+        ..error
+    }
 }
 
 /// Returns a result that later steps read from its file, or the error of writing it.

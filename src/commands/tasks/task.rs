@@ -100,7 +100,10 @@ pub(crate) struct AuditStep {
 
 impl Default for AuditStep {
     fn default() -> Self {
-        AuditStep { robots: "all".to_string(), criteria: Criteria::default() }
+        AuditStep {
+            robots: "all".to_string(),
+            criteria: Criteria::default(),
+        }
     }
 }
 
@@ -134,7 +137,9 @@ impl Steps {
     pub(crate) fn check(&self, trains: bool) -> Result<(), Error> {
         if let Some(step) = &self.audit {
             selection("audit.robots", &step.robots)?;
-            step.criteria.check().map_err(|error| error.with_key("audit.criteria"))?;
+            step.criteria
+                .check()
+                .map_err(|error| error.with_key("audit.criteria"))?;
         }
         let Some(step) = &self.eval else {
             return Ok(());
@@ -142,7 +147,11 @@ impl Steps {
         let tested = selection("eval.robots", &step.robots)?;
         let Some(audit) = self.audit.as_ref().filter(|_| step.physical_only) else {
             return match step.physical_only {
-                true => Err(Error::value("eval.physical_only", true, "it with [audit] only")),
+                true => Err(Error::value(
+                    "eval.physical_only",
+                    true,
+                    "it with [audit] only",
+                )),
                 false => Ok(()),
             };
         };
@@ -160,7 +169,8 @@ impl Steps {
 
 /// Parses a selection of robots; errors mention `key`.
 pub(crate) fn selection(key: &str, text: &str) -> Result<Selection, Error> {
-    text.parse().map_err(|error: String| Error::at_key(key, error))
+    text.parse()
+        .map_err(|error: String| Error::at_key(key, error))
 }
 
 /// The place where tasks are done.
@@ -184,11 +194,21 @@ impl Task {
             Run::Evolve(config, ..) => (config.settings(), Vec::new()),
             Run::Train(training) => (
                 training.config.settings(),
-                vec![("archive", training.sha256.clone()), ("robots", training.robots.clone())],
+                vec![
+                    ("archive", training.sha256.clone()),
+                    ("robots", training.robots.clone()),
+                ],
             ),
         };
-        let config = config.into_iter().filter(|(key, _)| key != "train.challengers");
-        config.chain(more.into_iter().map(|(key, value)| (key.to_string(), value.into()))).collect()
+        let config = config
+            .into_iter()
+            .filter(|(key, _)| key != "train.challengers");
+        config
+            .chain(
+                more.into_iter()
+                    .map(|(key, value)| (key.to_string(), value.into())),
+            )
+            .collect()
     }
 
     /// Returns the control steps per actuation cycle.
@@ -215,10 +235,17 @@ impl Task {
                 let of = |config: &Config, archive: String| -> Settings {
                     let all = config.settings().into_iter();
                     let own = all.filter(|(key, _)| key == "seed" || key.starts_with("task."));
-                    own.chain([("archive".to_string(), archive.into())]).collect()
+                    own.chain([("archive".to_string(), archive.into())])
+                        .collect()
                 };
-                let there = run.origin.as_ref().map_or("none".to_string(), |origin| origin.sha256.clone());
-                differing(&of(&run.config, there), &of(&training.config, training.sha256.clone()))
+                let there = run
+                    .origin
+                    .as_ref()
+                    .map_or("none".to_string(), |origin| origin.sha256.clone());
+                differing(
+                    &of(&run.config, there),
+                    &of(&training.config, training.sha256.clone()),
+                )
             }
         }
     }
@@ -227,9 +254,10 @@ impl Task {
     pub(crate) fn data_here(&self) -> Option<PathBuf> {
         let (data, whereabouts) = match &self.run {
             Run::Evolve(config, ..) => (&config.data, Whereabouts::given(None)),
-            Run::Train(training) => {
-                (&training.config.data, Whereabouts::given(None).and_of(&training.archive))
-            }
+            Run::Train(training) => (
+                &training.config.data,
+                Whereabouts::given(None).and_of(&training.archive),
+            ),
         };
         whereabouts.by_default(data)
     }
@@ -269,14 +297,25 @@ pub(crate) fn check_folders(tasks: &[Task], place: &TaskFolders) -> Result<(), V
         Some(error.in_place(&format!("task {number} ({})", task.name)))
     };
     let refused: Vec<Error> = (1..).zip(tasks).filter_map(check).collect();
-    if refused.is_empty() { Ok(()) } else { Err(refused) }
+    if refused.is_empty() {
+        Ok(())
+    } else {
+        Err(refused)
+    }
 }
 
 /// Returns the error for a folder with another run than its task's, with the keys that differ.
 pub(crate) fn another(folder: &Path, keys: &[(String, String, String)]) -> Error {
-    let said =
-        |(key, there, now): &(String, String, String)| format!("{key} = {there} there, {now} in the plan");
+    let said = |(key, there, now): &(String, String, String)| {
+        format!("{key} = {there} there, {now} in the plan")
+    };
     let keys: Vec<String> = keys.iter().map(said).collect();
-    let text = format!("{}: the run there differs: {}", folder.display(), keys.join("; "));
-    Error::input(text).remedy(Remedy::MoveAway).remedy(Remedy::ChooseOut)
+    let text = format!(
+        "{}: the run there differs: {}",
+        folder.display(),
+        keys.join("; ")
+    );
+    Error::input(text)
+        .remedy(Remedy::MoveAway)
+        .remedy(Remedy::ChooseOut)
 }

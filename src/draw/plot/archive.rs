@@ -29,26 +29,41 @@ pub fn archive(run: &RunFile) -> Figure {
     let (columns, width) = if tasks == 1 { (1, COLUMN) } else { (4, PAGE) };
     let of = format!(
         "{}, seed {}, generation {}; {} of {} cells",
-        run.name, run.config.seed, run.generations, run.stats.num_elites, run.dimensions.possible_cells
+        run.name,
+        run.config.seed,
+        run.generations,
+        run.stats.num_elites,
+        run.dimensions.possible_cells
     );
     let top = heading(&mut canvas, "Fitness of the elites", &of, width);
     let side = (width - 2.0 * MARGIN) / columns as f64 - LEFT - 4.0;
     let title = if tasks == 1 { 2.0 } else { 14.0 };
     let map_height = title + side + BELOW;
     let space = DescriptorSpace::voxel_counts(tasks);
-    let possible: BTreeSet<Vec<usize>> =
-        possible_cells(run.config.body.height * run.config.body.width, run.config.body.min_muscles, tasks)
-            .into_iter()
-            .filter_map(|index| space.coordinates(index))
-            .collect();
-    let elites: BTreeMap<Vec<usize>, f64> =
-        run.elites.iter().map(|robot| (robot.cell.clone(), robot.objective)).collect();
+    let possible: BTreeSet<Vec<usize>> = possible_cells(
+        run.config.body.height * run.config.body.width,
+        run.config.body.min_muscles,
+        tasks,
+    )
+    .into_iter()
+    .filter_map(|index| space.coordinates(index))
+    .collect();
+    let elites: BTreeMap<Vec<usize>, f64> = run
+        .elites
+        .iter()
+        .map(|robot| (robot.cell.clone(), robot.objective))
+        .collect();
     for task in 0..tasks {
         let (row, column) = (task / columns, task % columns);
         let x = MARGIN + LEFT + column as f64 * (side + LEFT + 4.0);
         let y = top + title + row as f64 * (map_height + 4.0);
         if tasks > 1 {
-            canvas.fitted([x, y - 4.0], &run.dimensions.tasks[task], side, TextStyle::default().bold());
+            canvas.fitted(
+                [x, y - 4.0],
+                &run.dimensions.tasks[task],
+                side,
+                TextStyle::default().bold(),
+            );
         }
         let cell = |bins: [usize; 3]| {
             let mut cell = bins.to_vec();
@@ -63,15 +78,37 @@ pub fn archive(run: &RunFile) -> Figure {
     let maps = top + rows as f64 * (map_height + 4.0);
     let height = if tasks == 1 {
         // A map's upper right half is empty: more muscles and sensors than voxels.
-        legend(&mut canvas, [MARGIN + LEFT + 0.53 * side, top + 0.01 * side], 0.44 * side, &scale, true);
-        canvas.text([width / 2.0, maps + 3.0], &STRIPS.join(" "), TextStyle::middle().colour(colour::FAINT));
+        legend(
+            &mut canvas,
+            [MARGIN + LEFT + 0.53 * side, top + 0.01 * side],
+            0.44 * side,
+            &scale,
+            true,
+        );
+        canvas.text(
+            [width / 2.0, maps + 3.0],
+            &STRIPS.join(" "),
+            TextStyle::middle().colour(colour::FAINT),
+        );
         maps + 4.0
     } else if !tasks.is_multiple_of(columns) {
         let free = MARGIN + LEFT + (tasks % columns) as f64 * (side + LEFT + 4.0);
-        legend(&mut canvas, [free, maps - map_height + 20.0], side, &scale, false);
+        legend(
+            &mut canvas,
+            [free, maps - map_height + 20.0],
+            side,
+            &scale,
+            false,
+        );
         maps
     } else {
-        legend(&mut canvas, [MARGIN + LEFT, maps + 12.0], side, &scale, false);
+        legend(
+            &mut canvas,
+            [MARGIN + LEFT, maps + 12.0],
+            side,
+            &scale,
+            false,
+        );
         maps + 78.0
     };
     Figure::new(&format!("Archive: {of}"), [width, height + MARGIN], canvas)
@@ -122,8 +159,11 @@ fn map(
     let step = side / COUNT_BINS as f64;
     let gap = 0.08 * step;
     let strip = (step - gap) / COUNT_BINS as f64;
-    let (mut frames, mut strokes, mut paths) =
-        (Vec::new(), Vec::new(), BTreeMap::<[u8; 3], Vec<Piece>>::new());
+    let (mut frames, mut strokes, mut paths) = (
+        Vec::new(),
+        Vec::new(),
+        BTreeMap::<[u8; 3], Vec<Piece>>::new(),
+    );
     for muscle in 0..COUNT_BINS {
         for sensor in 0..COUNT_BINS {
             let left = x + muscle as f64 * step + gap / 2.0;
@@ -135,7 +175,10 @@ fn map(
                 let (at, size) = ([left + total as f64 * strip, top], [strip, step - gap]);
                 frames.push(Piece::Rectangle { at, size });
                 if let Some(fitness) = elite {
-                    paths.entry(scale.colour(fitness).rgb).or_default().push(Piece::Rectangle { at, size });
+                    paths
+                        .entry(scale.colour(fitness).rgb)
+                        .or_default()
+                        .push(Piece::Rectangle { at, size });
                     if fitness < 0.0 {
                         strokes.push(stroke(at, size));
                     }
@@ -154,7 +197,11 @@ fn map(
 }
 
 /// The line through cells with fitness below 0: colour-blind viewers could take gray for a colour.
-const STROKE: Pen = Pen { colour: colour::INK, width: 0.5, dashes: None };
+const STROKE: Pen = Pen {
+    colour: colour::INK,
+    width: 0.5,
+    dashes: None,
+};
 
 fn stroke([x, y]: [f64; 2], [width, height]: [f64; 2]) -> Piece {
     Piece::Line(vec![[x, y + height], [x + width, y]])
@@ -162,7 +209,9 @@ fn stroke([x, y]: [f64; 2], [width, height]: [f64; 2]) -> Piece {
 
 /// Returns the voxel counts at which bins begin.
 fn edges(area: usize) -> Vec<usize> {
-    (0..COUNT_BINS).filter_map(|bin| (0..=area).find(|&count| count_bin(count, area) == bin)).collect()
+    (0..COUNT_BINS)
+        .filter_map(|bin| (0..=area).find(|&count| count_bin(count, area) == bin))
+        .collect()
 }
 
 fn axes(canvas: &mut Canvas, [x, y]: [f64; 2], side: f64, run: &RunFile, is_first: bool) {
@@ -177,36 +226,70 @@ fn axes(canvas: &mut Canvas, [x, y]: [f64; 2], side: f64, run: &RunFile, is_firs
         canvas.line([x + at, y + side], [x + at, y + side + 2.5], pen);
         canvas.line([x - 2.5, y + side - at], [x, y + side - at], pen);
         if bin % every == 0 {
-            canvas.text([x + at, y + side + 10.0], &edge.to_string(), TextStyle::middle());
-            canvas.text([x - 4.5, y + side - at + 0.36 * TEXT], &edge.to_string(), TextStyle::end());
+            canvas.text(
+                [x + at, y + side + 10.0],
+                &edge.to_string(),
+                TextStyle::middle(),
+            );
+            canvas.text(
+                [x - 4.5, y + side - at + 0.36 * TEXT],
+                &edge.to_string(),
+                TextStyle::end(),
+            );
         }
     }
-    canvas.text([x + side / 2.0, y + side + 20.0], "muscle voxels", TextStyle::middle());
+    canvas.text(
+        [x + side / 2.0, y + side + 20.0],
+        "muscle voxels",
+        TextStyle::middle(),
+    );
     if is_first {
-        let words = TextStyle { upwards: true, ..TextStyle::middle() };
+        let words = TextStyle {
+            upwards: true,
+            ..TextStyle::middle()
+        };
         canvas.text([x - LEFT + 8.0, y + side / 2.0], "sensor voxels", words);
     }
 }
 
 /// Draws the legend; `is_above` if it lies over a map, which leaves little room.
 fn legend(canvas: &mut Canvas, [x, y]: [f64; 2], width: f64, scale: &Scale, is_above: bool) {
-    let name = scale.unit.map_or("fitness".to_string(), |unit| format!("fitness [{unit}]"));
-    colour_bar(canvas, [x, y + 4.0], width - 6.0, &scale.right, &name, |value| scale.colour(value));
+    let name = scale
+        .unit
+        .map_or("fitness".to_string(), |unit| format!("fitness [{unit}]"));
+    colour_bar(
+        canvas,
+        [x, y + 4.0],
+        width - 6.0,
+        &scale.right,
+        &name,
+        |value| scale.colour(value),
+    );
     let mut lines = Vec::new();
     if let Some(lowest) = scale.lowest {
-        lines.push((scales::below(0.5), format!("below 0 (to {})", number(lowest).replace('-', "−"))));
+        lines.push((
+            scales::below(0.5),
+            format!("below 0 (to {})", number(lowest).replace('-', "−")),
+        ));
     }
     if scale.is_open {
         lines.push((colour::PAPER, "no elite".to_string()));
     }
-    let lines = lines.iter().map(|(fill, text)| (Material::Empty, *fill, text.as_str()));
+    let lines = lines
+        .iter()
+        .map(|(fill, text)| (Material::Empty, *fill, text.as_str()));
     let below = robot::legend(canvas, [x, y + 26.0], lines, width);
     if scale.lowest.is_some() {
         canvas.path(vec![stroke([x, y + 26.0], [7.0, 7.0])], STROKE);
     }
     if !is_above {
         for (k, text) in STRIPS.into_iter().enumerate() {
-            canvas.fitted([x, below + 6.0 + 9.5 * k as f64], text, width + 10.0, TextStyle::default());
+            canvas.fitted(
+                [x, below + 6.0 + 9.5 * k as f64],
+                text,
+                width + 10.0,
+                TextStyle::default(),
+            );
         }
     }
 }
@@ -223,7 +306,12 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_gray_and_what_is_right_is_not() {
-        let scale = Scale { right: Axis::nice(0.0, 20.0, 4), lowest: Some(-10.0), is_open: true, unit: None };
+        let scale = Scale {
+            right: Axis::nice(0.0, 20.0, 4),
+            lowest: Some(-10.0),
+            is_open: true,
+            unit: None,
+        };
         assert_eq!(scale.colour(20.0), scales::sequential(1.0));
         assert_eq!(scale.colour(-10.0), scales::below(0.0));
         assert_ne!(scale.colour(-0.1), scale.colour(0.1));

@@ -29,7 +29,11 @@ impl Axis {
         let slack = 1e-9 * step;
         let down = ((from + slack) / step).floor() * step;
         let up = ((to - slack) / step).ceil() * step;
-        Axis { from: down, to: up, step }
+        Axis {
+            from: down,
+            to: up,
+            step,
+        }
     }
 
     /// Returns exactly the range low … high, with about this number of ticks in it.
@@ -37,31 +41,55 @@ impl Axis {
         let axis = Axis::stepped(low, high, about);
         // A single tick gives no scale: a step longer than both sides leaves only zero. With about
         // six, steps are shorter than half the range, so there are two ticks wherever it begins.
-        if axis.ticks().len() > 1 { axis } else { Axis::stepped(low, high, 6) }
+        if axis.ticks().len() > 1 {
+            axis
+        } else {
+            Axis::stepped(low, high, 6)
+        }
     }
 
     fn stepped(low: f64, high: f64, about: usize) -> Self {
         let finite = |v: f64, other: f64| {
-            if v.is_finite() { v.clamp(-1e12, 1e12) } else { other }
+            if v.is_finite() {
+                v.clamp(-1e12, 1e12)
+            } else {
+                other
+            }
         };
         let (low, high) = (finite(low, 0.0), finite(high, 1.0));
-        let (low, high) = if high - low > 1e-9 { (low, high) } else { (low - 0.5, low + 0.5) };
+        let (low, high) = if high - low > 1e-9 {
+            (low, high)
+        } else {
+            (low - 0.5, low + 0.5)
+        };
         let rough = (high - low) / about.max(1) as f64;
         let power = libm::pow(10.0, libm::log10(rough).floor());
-        let factor = [1.0, 2.0, 5.0, 10.0].into_iter().find(|f| f * power >= rough * 0.999).unwrap_or(10.0);
-        Axis { from: low, to: high, step: factor * power }
+        let factor = [1.0, 2.0, 5.0, 10.0]
+            .into_iter()
+            .find(|f| f * power >= rough * 0.999)
+            .unwrap_or(10.0);
+        Axis {
+            from: low,
+            to: high,
+            step: factor * power,
+        }
     }
 
     /// Restricts ticks to whole numbers.
     pub(crate) fn whole(self) -> Self {
-        Axis { step: self.step.max(1.0), ..self }
+        Axis {
+            step: self.step.max(1.0),
+            ..self
+        }
     }
 
     /// Returns the positions of the ticks.
     pub(crate) fn ticks(&self) -> Vec<f64> {
         let first = (self.from / self.step - 1e-6).ceil();
         let count = ((self.to / self.step + 1e-6).floor() - first).clamp(-1.0, 100.0) as i32;
-        (0..=count).map(|k| (first + f64::from(k)) * self.step).collect()
+        (0..=count)
+            .map(|k| (first + f64::from(k)) * self.step)
+            .collect()
     }
 
     /// Formats a number for a tick.
@@ -72,7 +100,10 @@ impl Axis {
 
     /// Returns the width of the widest tick label, points.
     pub(crate) fn labels_width(&self) -> f64 {
-        let widths = self.ticks().into_iter().map(|tick| fonts::width(&self.label(tick), TEXT, false));
+        let widths = self
+            .ticks()
+            .into_iter()
+            .map(|tick| fonts::width(&self.label(tick), TEXT, false));
         widths.fold(0.0, f64::max)
     }
 
@@ -84,7 +115,9 @@ impl Axis {
 
 /// Groups digits in threes and uses a real minus sign.
 fn grouped(text: &str) -> String {
-    let (sign, digits) = text.strip_prefix('-').map_or(("", text), |digits| ("−", digits));
+    let (sign, digits) = text
+        .strip_prefix('-')
+        .map_or(("", text), |digits| ("−", digits));
     let (whole, rest) = digits.split_at(digits.find('.').unwrap_or(digits.len()));
     let mut out = String::from(sign);
     for (k, digit) in whole.chars().enumerate() {
@@ -108,7 +141,10 @@ pub(crate) struct Plot {
 impl Plot {
     /// Maps a pair of values to a point of the figure, in points.
     pub(crate) fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        [self.at[0] + self.x.share(x) * self.size[0], self.at[1] + (1.0 - self.y.share(y)) * self.size[1]]
+        [
+            self.at[0] + self.x.share(x) * self.size[0],
+            self.at[1] + (1.0 - self.y.share(y)) * self.size[1],
+        ]
     }
 
     /// Draws grid lines at the ticks.
@@ -129,12 +165,20 @@ impl Plot {
     pub(crate) fn lower_axis(&self, canvas: &mut Canvas, name: Option<&str>) {
         let bottom = self.at[1] + self.size[1];
         let pen = Pen::new(colour::INK, LINE);
-        canvas.line([self.at[0], bottom], [self.at[0] + self.size[0], bottom], pen);
+        canvas.line(
+            [self.at[0], bottom],
+            [self.at[0] + self.size[0], bottom],
+            pen,
+        );
         for tick in self.x.ticks() {
             let x = self.place([tick, self.y.from])[0];
             canvas.line([x, bottom], [x, bottom + TICK], pen);
             if name.is_some() {
-                canvas.text([x, bottom + TICK + GAP + 0.72 * TEXT], &self.x.label(tick), TextStyle::middle());
+                canvas.text(
+                    [x, bottom + TICK + GAP + 0.72 * TEXT],
+                    &self.x.label(tick),
+                    TextStyle::middle(),
+                );
             }
         }
         if let Some(name) = name {
@@ -156,10 +200,17 @@ impl Plot {
         for tick in self.y.ticks() {
             let y = self.place([self.x.from, tick])[1];
             canvas.line([left - TICK, y], [left, y], pen);
-            canvas.text([left - TICK - GAP, y + 0.36 * TEXT], &self.y.label(tick), TextStyle::end());
+            canvas.text(
+                [left - TICK - GAP, y + 0.36 * TEXT],
+                &self.y.label(tick),
+                TextStyle::end(),
+            );
         }
         let x = left - TICK - GAP - labels - 4.0;
-        let words = TextStyle { upwards: true, ..TextStyle::middle() };
+        let words = TextStyle {
+            upwards: true,
+            ..TextStyle::middle()
+        };
         canvas.text([x, top + self.size[1] / 2.0], name, words);
     }
 }
@@ -178,14 +229,24 @@ pub(crate) fn heading(canvas: &mut Canvas, title: &str, of: &str, width: f64) ->
 }
 
 /// Draws the same as [`heading`], with up to `count` lines for the subject.
-pub(crate) fn heading_in_lines(canvas: &mut Canvas, title: &str, of: &str, width: f64, count: usize) -> f64 {
+pub(crate) fn heading_in_lines(
+    canvas: &mut Canvas,
+    title: &str,
+    of: &str,
+    width: f64,
+    count: usize,
+) -> f64 {
     const LINE: f64 = 9.5;
     let most = width - 2.0 * MARGIN;
     canvas.fitted(
         [MARGIN, MARGIN + 7.0],
         title,
         most,
-        TextStyle { size: HEADING, ..TextStyle::default() }.bold(),
+        TextStyle {
+            size: HEADING,
+            ..TextStyle::default()
+        }
+        .bold(),
     );
     let lines = fonts::lines(of, TEXT, false, most, count);
     for (k, line) in lines.iter().enumerate() {
@@ -212,10 +273,15 @@ pub(crate) fn colour_bar(
     let size = [width, 6.0];
     for k in 0..STEPS {
         let share = |k: u32| f64::from(k) / f64::from(STEPS);
-        let value =
-            axis.from + share(k) * (axis.to - axis.from) + 0.5 * (axis.to - axis.from) / f64::from(STEPS);
+        let value = axis.from
+            + share(k) * (axis.to - axis.from)
+            + 0.5 * (axis.to - axis.from) / f64::from(STEPS);
         // Slightly wider steps leave no gaps for light to shine through.
-        let wide = if k + 1 < STEPS { width / f64::from(STEPS) + 0.4 } else { width / f64::from(STEPS) };
+        let wide = if k + 1 < STEPS {
+            width / f64::from(STEPS) + 0.4
+        } else {
+            width / f64::from(STEPS)
+        };
         canvas.rectangle([x + width * share(k), y], [wide, size[1]], colour_of(value));
     }
     let pen = Pen::new(colour::INK, LINE);
@@ -223,7 +289,11 @@ pub(crate) fn colour_bar(
     for tick in axis.ticks() {
         let at = x + width * axis.share(tick);
         canvas.line([at, y + size[1]], [at, y + size[1] + TICK], pen);
-        canvas.text([at, y + size[1] + TICK + GAP + 0.72 * TEXT], &axis.label(tick), TextStyle::middle());
+        canvas.text(
+            [at, y + size[1] + TICK + GAP + 0.72 * TEXT],
+            &axis.label(tick),
+            TextStyle::middle(),
+        );
     }
 }
 
@@ -236,21 +306,39 @@ mod tests {
         let axis = Axis::nice(0.3, 28.4, 5);
         assert_eq!((axis.from, axis.to), (0.0, 30.0));
         assert_eq!(axis.ticks().len(), 4);
-        let labels: Vec<String> =
-            Axis::nice(0.0, 1.0, 5).ticks().iter().map(|t| Axis::nice(0.0, 1.0, 5).label(*t)).collect();
+        let labels: Vec<String> = Axis::nice(0.0, 1.0, 5)
+            .ticks()
+            .iter()
+            .map(|t| Axis::nice(0.0, 1.0, 5).label(*t))
+            .collect();
         assert_eq!(labels, ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
         let exact = Axis::exact(-3.0, 11.0, 4);
-        assert_eq!((exact.ticks(), exact.share(4.0)), (vec![0.0, 5.0, 10.0], 0.5));
+        assert_eq!(
+            (exact.ticks(), exact.share(4.0)),
+            (vec![0.0, 5.0, 10.0], 0.5)
+        );
         // Steps of fifty would leave one tick, at zero.
-        assert_eq!(Axis::exact(-48.0, 48.0, 4).ticks(), [-40.0, -20.0, 0.0, 20.0, 40.0]);
+        assert_eq!(
+            Axis::exact(-48.0, 48.0, 4).ticks(),
+            [-40.0, -20.0, 0.0, 20.0, 40.0]
+        );
         for side in (1..1000).map(|tenths| f64::from(tenths) / 10.0) {
-            assert!((1..10).all(|about| Axis::exact(-side, side, about).ticks().len() > 1), "{side}");
+            assert!(
+                (1..10).all(|about| Axis::exact(-side, side, about).ticks().len() > 1),
+                "{side}"
+            );
         }
     }
 
     #[test]
     fn any_range_has_an_axis() {
-        for (low, high) in [(0.0, 0.0), (f64::NAN, 1.0), (5.0, -5.0), (0.0, f64::INFINITY), (1e300, -1e300)] {
+        for (low, high) in [
+            (0.0, 0.0),
+            (f64::NAN, 1.0),
+            (5.0, -5.0),
+            (0.0, f64::INFINITY),
+            (1e300, -1e300),
+        ] {
             let axis = Axis::nice(low, high, 5);
             assert!(
                 axis.from < axis.to && !axis.ticks().is_empty() && axis.ticks().len() < 50,

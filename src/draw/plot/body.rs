@@ -26,18 +26,37 @@ pub(crate) fn body(body: &Body, of: &str) -> Figure {
         material => robot::plain(*material),
     };
     let seam = (0.05 * cell).min(0.5);
-    robot::squares(&mut canvas, at, cell, seam, body.voxels().iter().map(|(place, m)| (place, fill(m))));
-    let cells = || body.voxels().iter().map(|(place, material)| (place, *material));
+    robot::squares(
+        &mut canvas,
+        at,
+        cell,
+        seam,
+        body.voxels().iter().map(|(place, m)| (place, fill(m))),
+    );
+    let cells = || {
+        body.voxels()
+            .iter()
+            .map(|(place, material)| (place, *material))
+    };
     robot::marks(&mut canvas, at, cell, cells(), robot::plain);
     robot::body_outline(&mut canvas, at, cell, body, Pen::new(colour::INK, 0.8));
-    let count = |material: Material| body.voxels().cells().iter().filter(|m| **m == material).count();
-    let lines: Vec<(Material, String)> =
-        present(body).map(|m| (m, format!("{} ({})", m.name(), count(m)))).collect();
+    let count = |material: Material| {
+        body.voxels()
+            .cells()
+            .iter()
+            .filter(|m| **m == material)
+            .count()
+    };
+    let lines: Vec<(Material, String)> = present(body)
+        .map(|m| (m, format!("{} ({})", m.name(), count(m))))
+        .collect();
     let x = at[0] + MAP + 10.0;
     let below = robot::legend(
         &mut canvas,
         [x, top],
-        lines.iter().map(|(material, text)| (*material, robot::plain(*material), text.as_str())),
+        lines
+            .iter()
+            .map(|(material, text)| (*material, robot::plain(*material), text.as_str())),
         COLUMN - MARGIN - x,
     );
     let counts = body.counts();

@@ -38,19 +38,31 @@ pub(crate) struct TextStyle {
 
 impl Default for TextStyle {
     fn default() -> Self {
-        TextStyle { size: TEXT, bold: false, colour: colour::INK, anchor: Anchor::Start, upwards: false }
+        TextStyle {
+            size: TEXT,
+            bold: false,
+            colour: colour::INK,
+            anchor: Anchor::Start,
+            upwards: false,
+        }
     }
 }
 
 impl TextStyle {
     /// Returns the default style, anchored in the middle.
     pub(crate) fn middle() -> Self {
-        TextStyle { anchor: Anchor::Middle, ..TextStyle::default() }
+        TextStyle {
+            anchor: Anchor::Middle,
+            ..TextStyle::default()
+        }
     }
 
     /// Returns the default style, anchored at the right end.
     pub(crate) fn end() -> Self {
-        TextStyle { anchor: Anchor::End, ..TextStyle::default() }
+        TextStyle {
+            anchor: Anchor::End,
+            ..TextStyle::default()
+        }
     }
 
     /// Sets the colour.
@@ -76,12 +88,19 @@ pub(crate) struct Pen {
 impl Pen {
     /// Creates a pen for solid lines.
     pub(crate) fn new(colour: Colour, width: f64) -> Self {
-        Pen { colour, width, dashes: None }
+        Pen {
+            colour,
+            width,
+            dashes: None,
+        }
     }
 
     /// Makes the line dashed.
     pub(crate) fn dashed(self, dash: f64, gap: f64) -> Self {
-        Pen { dashes: Some([dash, gap]), ..self }
+        Pen {
+            dashes: Some([dash, gap]),
+            ..self
+        }
     }
 }
 
@@ -167,12 +186,20 @@ impl Canvas {
 
     /// Draws a filled rectangle from its top left corner.
     pub(crate) fn rectangle(&mut self, at: [f64; 2], size: [f64; 2], fill: Colour) {
-        self.elements.push(Element::Rectangle { at, size, ink: Ink::Fill(fill) });
+        self.elements.push(Element::Rectangle {
+            at,
+            size,
+            ink: Ink::Fill(fill),
+        });
     }
 
     /// Draws the outline of a rectangle.
     pub(crate) fn frame(&mut self, at: [f64; 2], size: [f64; 2], pen: Pen) {
-        self.elements.push(Element::Rectangle { at, size, ink: Ink::Line(pen) });
+        self.elements.push(Element::Rectangle {
+            at,
+            size,
+            ink: Ink::Line(pen),
+        });
     }
 
     /// Draws a line between two points.
@@ -192,12 +219,18 @@ impl Canvas {
 
     /// Draws the line of a path.
     pub(crate) fn path(&mut self, pieces: Vec<Piece>, pen: Pen) {
-        self.elements.push(Element::Path { pieces, ink: Ink::Line(pen) });
+        self.elements.push(Element::Path {
+            pieces,
+            ink: Ink::Line(pen),
+        });
     }
 
     /// Draws a filled path.
     pub(crate) fn area(&mut self, pieces: Vec<Piece>, fill: Colour) {
-        self.elements.push(Element::Path { pieces, ink: Ink::Fill(fill) });
+        self.elements.push(Element::Path {
+            pieces,
+            ink: Ink::Fill(fill),
+        });
     }
 
     /// Draws a filled circle.
@@ -213,7 +246,11 @@ impl Canvas {
 
     /// Draws a text, cut to fit into `most` points.
     pub(crate) fn fitted(&mut self, at: [f64; 2], text: &str, most: f64, words: TextStyle) {
-        self.text(at, &fonts::fitted(text, words.size, words.bold, most), words);
+        self.text(
+            at,
+            &fonts::fitted(text, words.size, words.bold, most),
+            words,
+        );
     }
 
     /// Draws the content of `draw` with an opacity as a whole.
@@ -233,7 +270,11 @@ impl Canvas {
 
 /// Clamps a number to what can be drawn; NaN becomes 0.
 pub(super) fn drawable(value: f64) -> f64 {
-    if value.is_nan() { 0.0 } else { value.clamp(-1e6, 1e6) }
+    if value.is_nan() {
+        0.0
+    } else {
+        value.clamp(-1e6, 1e6)
+    }
 }
 
 /// Replaces letters that cannot be drawn or that XML forbids.
@@ -250,7 +291,15 @@ mod tests {
     fn lines_are_broken_where_there_is_no_number() {
         let mut canvas = Canvas::new();
         let nan = f64::NAN;
-        let points = [[0.0, 0.0], [1.0, 1.0], [2.0, nan], [3.0, 1.0], [4.0, 1.0], [nan, 0.0], [5.0, 5.0]];
+        let points = [
+            [0.0, 0.0],
+            [1.0, 1.0],
+            [2.0, nan],
+            [3.0, 1.0],
+            [4.0, 1.0],
+            [nan, 0.0],
+            [5.0, 5.0],
+        ];
         canvas.polyline(&points, Pen::new(colour::INK, 1.0));
         assert!(canvas.svg().contains("d=\"M0 0L1 1M3 1L4 1\""));
     }

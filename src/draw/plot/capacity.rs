@@ -13,18 +13,41 @@ use crate::store::capacity::{CapacityFile, Curve, Point, TaskCapacity};
 const PANEL: f64 = 104.0;
 /// Segments of the fitted curve.
 const SEGMENTS: u32 = 60;
-const ROBOTS: Pen = Pen { colour: scales::VERMILLION, width: 1.1, dashes: None };
-const FIT: Pen = Pen { colour: colour::INK, width: 0.9, dashes: None };
-const CROSSING: Pen = Pen { colour: scales::VERMILLION, width: 0.9, dashes: Some([2.5, 1.8]) };
+const ROBOTS: Pen = Pen {
+    colour: scales::VERMILLION,
+    width: 1.1,
+    dashes: None,
+};
+const FIT: Pen = Pen {
+    colour: colour::INK,
+    width: 0.9,
+    dashes: None,
+};
+const CROSSING: Pen = Pen {
+    colour: scales::VERMILLION,
+    width: 0.9,
+    dashes: Some([2.5, 1.8]),
+};
 
 /// Plots the mean accuracy of networks over their size with its standard deviation, the quadratic
 /// fit, the robots' accuracy and where the two meet; a panel per task and kind of network.
 pub(crate) fn capacity(file: &CapacityFile) -> Figure {
-    let panels: Vec<(&TaskCapacity, &Curve)> =
-        file.tasks.iter().flat_map(|task| task.curves.iter().map(move |curve| (task, curve))).collect();
-    let (columns, width) = if panels.len() <= 1 { (1, COLUMN) } else { (2, PAGE) };
+    let panels: Vec<(&TaskCapacity, &Curve)> = file
+        .tasks
+        .iter()
+        .flat_map(|task| task.curves.iter().map(move |curve| (task, curve)))
+        .collect();
+    let (columns, width) = if panels.len() <= 1 {
+        (1, COLUMN)
+    } else {
+        (2, PAGE)
+    };
     let mut canvas = Canvas::new();
-    let stopped = if file.stopped { "; stopped before the end" } else { "" };
+    let stopped = if file.stopped {
+        "; stopped before the end"
+    } else {
+        ""
+    };
     let of = format!("{}; {}; {}{stopped}", file.run, file.selected, file.dataset);
     let top = heading(&mut canvas, "Morphological cognition capacity", &of, width);
     let y = accuracies(&panels);
@@ -33,12 +56,26 @@ pub(crate) fn capacity(file: &CapacityFile) -> Figure {
     let high = 14.0 + PANEL + AXIS + 6.0;
     for (k, (task, curve)) in panels.iter().enumerate() {
         let (row, column) = (k / columns, k % columns);
-        let at = [MARGIN + column as f64 * wide + space, top + 14.0 + row as f64 * high];
-        panel(&mut canvas, at, [wide - space - 12.0, PANEL], &y, task, curve);
+        let at = [
+            MARGIN + column as f64 * wide + space,
+            top + 14.0 + row as f64 * high,
+        ];
+        panel(
+            &mut canvas,
+            at,
+            [wide - space - 12.0, PANEL],
+            &y,
+            task,
+            curve,
+        );
     }
     let below = top + panels.len().div_ceil(columns) as f64 * high;
     let height = legend(&mut canvas, file.trainings, [MARGIN + 4.0, below], width) + MARGIN;
-    Figure::new(&format!("Morphological cognition capacity: {of}"), [width, height], canvas)
+    Figure::new(
+        &format!("Morphological cognition capacity: {of}"),
+        [width, height],
+        canvas,
+    )
 }
 
 /// Returns one axis for all panels, so that they are comparable.
@@ -47,8 +84,9 @@ fn accuracies(panels: &[(&TaskCapacity, &Curve)]) -> Axis {
         let points = curve.points.iter();
         points.flat_map(bar).chain([task.accuracy])
     });
-    let (low, high) =
-        values.filter(|v| v.is_finite()).fold((0.5f64, 0.6f64), |(l, h), v| (l.min(v), h.max(v)));
+    let (low, high) = values
+        .filter(|v| v.is_finite())
+        .fold((0.5f64, 0.6f64), |(l, h), v| (l.min(v), h.max(v)));
     Axis::nice(100.0 * low.max(0.0), 100.0 * high.min(1.0), 5)
 }
 
@@ -66,31 +104,56 @@ fn network(curve: &Curve) -> (&str, &str) {
     }
 }
 
-fn panel(canvas: &mut Canvas, at: [f64; 2], size: [f64; 2], y: &Axis, task: &TaskCapacity, curve: &Curve) {
+fn panel(
+    canvas: &mut Canvas,
+    at: [f64; 2],
+    size: [f64; 2],
+    y: &Axis,
+    task: &TaskCapacity,
+    curve: &Curve,
+) {
     let sizes = || curve.points.iter().map(|point| point.size as f64);
     let largest = sizes().fold(1.0, f64::max);
-    let plot = Plot { at, size, x: Axis::exact(0.0, largest + 1.0, 5).whole(), y: y.clone() };
+    let plot = Plot {
+        at,
+        size,
+        x: Axis::exact(0.0, largest + 1.0, 5).whole(),
+        y: y.clone(),
+    };
     let (kind, unit) = network(curve);
     // If the smallest size already exceeds the robots, nothing crosses.
     let (found, crossing) = match curve.capacity {
-        Some(below @ Crossing::Below { .. }) => {
-            (format!("capacity {below}: the curve begins above the robots"), None)
-        }
+        Some(below @ Crossing::Below { .. }) => (
+            format!("capacity {below}: the curve begins above the robots"),
+            None,
+        ),
         Some(at @ Crossing::At(size)) => (format!("capacity {at} {unit}"), Some(size)),
-        None => ("no capacity: the curve never reaches the robots".to_string(), None),
+        None => (
+            "no capacity: the curve never reaches the robots".to_string(),
+            None,
+        ),
     };
     // Half of the room is for the words beside the title.
     let title = fonts::fitted(&task.task, TextStyle::default().size, true, 0.4 * size[0]);
     let title = format!("{title}, {kind}");
     canvas.text([at[0], at[1] - 5.0], &title, TextStyle::default().bold());
     let left = fonts::width(&title, TextStyle::default().size, true) + 6.0;
-    canvas.fitted([at[0] + left, at[1] - 5.0], &found, size[0] - left, TextStyle::default());
+    canvas.fitted(
+        [at[0] + left, at[1] - 5.0],
+        &found,
+        size[0] - left,
+        TextStyle::default(),
+    );
     plot.grid(canvas, true, false);
     canvas.clipped(at, size, |canvas| {
         for point in &curve.points {
             let place = |accuracy: f64| plot.place([point.size as f64, 100.0 * accuracy]);
             let [low, high] = bar(point);
-            canvas.line(place(low), place(high), Pen::new(scales::BLUE.with_opacity(120), 0.8));
+            canvas.line(
+                place(low),
+                place(high),
+                Pen::new(scales::BLUE.with_opacity(120), 0.8),
+            );
             canvas.dot(place(point.mean), 1.4, scales::BLUE);
         }
         if let (Some([c0, c1, c2]), Some(first)) = (curve.fit, curve.points.first()) {
@@ -100,9 +163,17 @@ fn panel(canvas: &mut Canvas, at: [f64; 2], size: [f64; 2], y: &Axis, task: &Tas
             canvas.polyline(&(0..=SEGMENTS).map(|k| fit(at(k))).collect::<Vec<_>>(), FIT);
         }
         let robots = 100.0 * task.accuracy;
-        canvas.line(plot.place([plot.x.from, robots]), plot.place([plot.x.to, robots]), ROBOTS);
+        canvas.line(
+            plot.place([plot.x.from, robots]),
+            plot.place([plot.x.to, robots]),
+            ROBOTS,
+        );
         if let Some(capacity) = crossing {
-            canvas.line(plot.place([capacity, robots]), plot.place([capacity, plot.y.from]), CROSSING);
+            canvas.line(
+                plot.place([capacity, robots]),
+                plot.place([capacity, plot.y.from]),
+                CROSSING,
+            );
             canvas.dot(plot.place([capacity, robots]), 2.2, scales::VERMILLION);
         }
     });
@@ -113,14 +184,20 @@ fn panel(canvas: &mut Canvas, at: [f64; 2], size: [f64; 2], y: &Axis, task: &Tas
 /// Draws the legend; returns the y below.
 fn legend(canvas: &mut Canvas, trainings: usize, [x, top]: [f64; 2], width: f64) -> f64 {
     let lines = [
-        (Pen::new(scales::BLUE.with_opacity(120), 0.8), format!("mean ± sd of {trainings} trainings")),
+        (
+            Pen::new(scales::BLUE.with_opacity(120), 0.8),
+            format!("mean ± sd of {trainings} trainings"),
+        ),
         (FIT, "fit of degree two".to_string()),
         (ROBOTS, "robots' mean".to_string()),
         (CROSSING, "capacity".to_string()),
     ];
     let [mut at, mut y] = [x, top + 6.0];
     for (k, (pen, text)) in lines.iter().enumerate() {
-        let words = TextStyle { anchor: Anchor::Start, ..TextStyle::default() };
+        let words = TextStyle {
+            anchor: Anchor::Start,
+            ..TextStyle::default()
+        };
         let wide = 17.0 + fonts::width(text, words.size, false) + 12.0;
         if at > x && at + wide > width - MARGIN {
             (at, y) = (x, y + 11.0);
@@ -179,14 +256,22 @@ mod tests {
     fn every_task_and_network_has_a_panel_with_its_capacity() {
         let svg = capacity(&file(Some(Crossing::At(16.8)))).svg();
         assert_eq!(svg.matches("capacity 16.8").count(), 4);
-        assert!(svg.contains("01|23, CNN") && svg.contains("hidden neurons") && svg.contains("kernels"));
+        assert!(
+            svg.contains("01|23, CNN") && svg.contains("hidden neurons") && svg.contains("kernels")
+        );
         assert!(capacity(&file(None)).svg().contains("never reaches"));
         // The robots are worse than any network: nothing crosses, so nothing is marked.
         let mut below = file(Some(Crossing::Below { below: 1.0 }));
         below.tasks.iter_mut().for_each(|task| task.accuracy = 0.3);
         let below = capacity(&below).svg();
-        assert!(below.contains("capacity &lt; 1: the curve begins above") && !below.contains("capacity 1"));
-        assert_eq!(below.matches("<circle").count(), svg.matches("<circle").count() - 4);
+        assert!(
+            below.contains("capacity &lt; 1: the curve begins above")
+                && !below.contains("capacity 1")
+        );
+        assert_eq!(
+            below.matches("<circle").count(),
+            svg.matches("<circle").count() - 4
+        );
     }
 
     #[test]

@@ -37,7 +37,12 @@ pub struct Figure {
 impl Figure {
     /// Creates a figure of a width and height in points, the content's origin at the top left.
     pub(super) fn new(title: &str, size: [f64; 2], content: Canvas) -> Self {
-        Figure { title: title.to_string(), size, content, background: Background::Paper }
+        Figure {
+            title: title.to_string(),
+            size,
+            content,
+            background: Background::Paper,
+        }
     }
 
     /// Sets the background.
@@ -63,7 +68,10 @@ impl Figure {
         let paper = match self.background {
             Background::Transparent => String::new(),
             Background::Paper => {
-                format!("<rect width=\"{width}\" height=\"{height}\" fill=\"{}\"/>", colour::PAPER.hex())
+                format!(
+                    "<rect width=\"{width}\" height=\"{height}\" fill=\"{}\"/>",
+                    colour::PAPER.hex()
+                )
             }
         };
         format!(
@@ -79,7 +87,8 @@ impl Figure {
     pub(crate) fn fitting(&self, dpi: u32) -> u32 {
         let longest = self.size.into_iter().fold(1.0, f64::max);
         // One pixel less, because a pixel cut by the edge counts too.
-        dpi.min(((MOST_PIXELS - 1.0) * 72.0 / longest) as u32).max(1)
+        dpi.min(((MOST_PIXELS - 1.0) * 72.0 / longest) as u32)
+            .max(1)
     }
 
     /// Returns the figure as PNG for print, with [`PRINT`] pixels per inch or as many as possible.
@@ -102,17 +111,25 @@ impl Figure {
         if !possible(width) || !possible(height) {
             return Err(PictureError::Figure { width, height });
         }
-        let mut pixmap =
-            Pixmap::new(width as u32, height as u32).ok_or(PictureError::Figure { width, height })?;
+        let mut pixmap = Pixmap::new(width as u32, height as u32)
+            .ok_or(PictureError::Figure { width, height })?;
         if self.background == Background::Paper {
             pixmap.fill(Color::WHITE);
         }
-        self.content.draw(&mut pixmap, Transform::from_scale(scale as f32, scale as f32));
-        encode_png(&pixmap, scale, self.background).map_err(|error| PictureError::Encode(error.to_string()))
+        self.content.draw(
+            &mut pixmap,
+            Transform::from_scale(scale as f32, scale as f32),
+        );
+        encode_png(&pixmap, scale, self.background)
+            .map_err(|error| PictureError::Encode(error.to_string()))
     }
 }
 
-fn encode_png(pixmap: &Pixmap, scale: f64, background: Background) -> Result<Vec<u8>, png::EncodingError> {
+fn encode_png(
+    pixmap: &Pixmap,
+    scale: f64,
+    background: Background,
+) -> Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, pixmap.width(), pixmap.height());
     encoder.set_depth(png::BitDepth::Eight);
@@ -127,11 +144,15 @@ fn encode_png(pixmap: &Pixmap, scale: f64, background: Background) -> Result<Vec
     let data: Vec<u8> = match background {
         Background::Paper => {
             encoder.set_color(png::ColorType::Rgb);
-            pixels.flat_map(|p| [p.red(), p.green(), p.blue()]).collect()
+            pixels
+                .flat_map(|p| [p.red(), p.green(), p.blue()])
+                .collect()
         }
         Background::Transparent => {
             encoder.set_color(png::ColorType::Rgba);
-            pixels.flat_map(|p| [p.red(), p.green(), p.blue(), p.alpha()]).collect()
+            pixels
+                .flat_map(|p| [p.red(), p.green(), p.blue(), p.alpha()])
+                .collect()
         }
     };
     let mut writer = encoder.write_header()?;
@@ -157,10 +178,16 @@ mod tests {
         let svg = figure().svg();
         let tree = roxmltree::Document::parse(&svg).unwrap();
         for node in tree.descendants() {
-            assert!(!node.has_attribute("id") && !node.has_attribute("class"), "{node:?}");
+            assert!(
+                !node.has_attribute("id") && !node.has_attribute("class"),
+                "{node:?}"
+            );
             assert!(node.tag_name().name() != "style");
         }
-        assert_eq!(tree.root_element().attribute("aria-label"), Some("A \"test\" <1>"));
+        assert_eq!(
+            tree.root_element().attribute("aria-label"),
+            Some("A \"test\" <1>")
+        );
     }
 
     #[test]
@@ -171,7 +198,13 @@ mod tests {
         assert_eq!(paper.pixel(1, 1).unwrap().red(), 255);
         assert_eq!(paper.pixel(30, 30).unwrap().red(), colour::INK.rgb[0]);
         let clear = read(&figure().on(Background::Transparent).png(144).unwrap());
-        assert_eq!((clear.pixel(1, 1).unwrap().alpha(), clear.pixel(30, 30).unwrap().alpha()), (0, 255));
+        assert_eq!(
+            (
+                clear.pixel(1, 1).unwrap().alpha(),
+                clear.pixel(30, 30).unwrap().alpha()
+            ),
+            (0, 255)
+        );
         // The letters are there, in the embedded font.
         let dark = (60..90).any(|y| (8..100).any(|x| paper.pixel(x, y).unwrap().red() < 100));
         assert!(dark);
@@ -191,6 +224,9 @@ mod tests {
             assert_eq!(long.fitting(PRINT), dpi.min(PRINT));
         }
         let long = Figure::new("long", [60.0, 17_000.0], Canvas::new());
-        assert_eq!(Pixmap::decode_png(&long.print().unwrap()).unwrap().height(), 15_820);
+        assert_eq!(
+            Pixmap::decode_png(&long.print().unwrap()).unwrap().height(),
+            15_820
+        );
     }
 }

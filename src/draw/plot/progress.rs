@@ -19,8 +19,16 @@ type Quantity = (&'static str, fn(&Moment) -> f64, Colour);
 
 const QUANTITIES: [Quantity; 3] = [
     ("QD score", |moment| moment.qd_score, scales::BLUE),
-    ("coverage [%]", |moment| 100.0 * moment.coverage, scales::GREEN),
-    ("best fitness", |moment| moment.obj_max.unwrap_or(f64::NAN), scales::VERMILLION),
+    (
+        "coverage [%]",
+        |moment| 100.0 * moment.coverage,
+        scales::GREEN,
+    ),
+    (
+        "best fitness",
+        |moment| moment.obj_max.unwrap_or(f64::NAN),
+        scales::VERMILLION,
+    ),
 ];
 
 /// The maximum number of groups with a line in the legend: as many as look different.
@@ -37,7 +45,11 @@ pub(crate) fn progress(runs: &[Progress]) -> Figure {
     let mut canvas = Canvas::new();
     let of = names(runs);
     let is_band = groups.iter().any(|group| group.runs.len() > 1);
-    let title = if is_band { "Progress: median, least and largest" } else { "Progress" };
+    let title = if is_band {
+        "Progress: median, least and largest"
+    } else {
+        "Progress"
+    };
     let mut top = heading(&mut canvas, title, &of, COLUMN) + 4.0;
     let ends: Vec<f64> = groups.iter().map(end).collect();
     let x = Axis::exact(0.0, ends.iter().copied().fold(1.0, f64::max), 4);
@@ -47,21 +59,40 @@ pub(crate) fn progress(runs: &[Progress]) -> Figure {
             let of = |(group, end): (&SettingsGroup, &f64)| bands(&group.runs, quantity.1, *end);
             let bands: Vec<Vec<Band>> = groups.iter().zip(&ends).map(of).collect();
             let all = || bands.iter().flatten();
-            let values = || all().flat_map(|band| [band.low, band.high]).filter(|v| v.is_finite());
-            let (low, high) = (values().fold(0.0, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+            let values = || {
+                all()
+                    .flat_map(|band| [band.low, band.high])
+                    .filter(|v| v.is_finite())
+            };
+            let (low, high) = (
+                values().fold(0.0, f64::min),
+                values().fold(f64::NEG_INFINITY, f64::max),
+            );
             (quantity, bands, Axis::nice(low, high, 4))
         })
         .collect();
-    let labels = panels.iter().map(|(_, _, y)| y.labels_width()).fold(0.0, f64::max);
+    let labels = panels
+        .iter()
+        .map(|(_, _, y)| y.labels_width())
+        .fold(0.0, f64::max);
     let left = MARGIN + left_space(labels);
     let count = panels.len();
     for (k, ((name, _, colour), bands, y)) in panels.into_iter().enumerate() {
         let size = [COLUMN - MARGIN - 8.0 - left, PANEL];
-        let plot = Plot { at: [left, top], size, x: x.clone(), y };
+        let plot = Plot {
+            at: [left, top],
+            size,
+            x: x.clone(),
+            y,
+        };
         plot.grid(&mut canvas, true, false);
         // The first on top: no nameless line hides a named one.
         for (number, (group, bands)) in groups.iter().zip(&bands).enumerate().rev() {
-            let pen = if groups.len() > 1 { pen(number) } else { Pen::new(colour, 1.2) };
+            let pen = if groups.len() > 1 {
+                pen(number)
+            } else {
+                Pen::new(colour, 1.2)
+            };
             draw(&mut canvas, &plot, bands, pen, group.runs.len() > 1);
         }
         plot.left_axis_beside(&mut canvas, name, labels);
@@ -69,11 +100,21 @@ pub(crate) fn progress(runs: &[Progress]) -> Figure {
         top += PANEL + 9.0;
     }
     let mut height = top - 9.0 + AXIS + MARGIN;
-    let note = TextStyle { size: TEXT, ..TextStyle::end() }.colour(colour::FAINT);
-    if let Some(unit) =
-        runs.first().and_then(|run| run.unit).filter(|unit| runs.iter().all(|run| run.unit == Some(unit)))
+    let note = TextStyle {
+        size: TEXT,
+        ..TextStyle::end()
+    }
+    .colour(colour::FAINT);
+    if let Some(unit) = runs
+        .first()
+        .and_then(|run| run.unit)
+        .filter(|unit| runs.iter().all(|run| run.unit == Some(unit)))
     {
-        canvas.text([COLUMN - MARGIN, height - MARGIN - 2.0], &format!("fitness: {unit}"), note);
+        canvas.text(
+            [COLUMN - MARGIN, height - MARGIN - 2.0],
+            &format!("fitness: {unit}"),
+            note,
+        );
     }
     if groups.len() > 1 {
         height = legend(&mut canvas, &groups, height + 2.0) + MARGIN;
@@ -93,7 +134,10 @@ fn end(group: &SettingsGroup) -> f64 {
 fn pen(number: usize) -> Pen {
     let colour = scales::SET[number % scales::SET.len()];
     match DASHES.get(number / scales::SET.len()) {
-        Some(dashes) => Pen { dashes: *dashes, ..Pen::new(colour, 1.1) },
+        Some(dashes) => Pen {
+            dashes: *dashes,
+            ..Pen::new(colour, 1.1)
+        },
         None => Pen::new(scales::CELL, 0.8),
     }
 }
@@ -103,19 +147,36 @@ fn legend(canvas: &mut Canvas, groups: &[SettingsGroup], top: f64) -> f64 {
     let mut y = top;
     for (number, group) in groups.iter().enumerate().take(NAMED) {
         y += 10.0;
-        canvas.line([MARGIN + 4.0, y - 2.6], [MARGIN + 18.0, y - 2.6], pen(number));
+        canvas.line(
+            [MARGIN + 4.0, y - 2.6],
+            [MARGIN + 18.0, y - 2.6],
+            pen(number),
+        );
         let seeds = match group.runs.len() {
             1 => format!("seed {}", group.runs[0].seed),
             count => format!("{count} seeds"),
         };
         let text = format!("{} ({seeds})", group.label);
-        canvas.fitted([MARGIN + 22.0, y], &text, COLUMN - 2.0 * MARGIN - 22.0, TextStyle::default());
+        canvas.fitted(
+            [MARGIN + 22.0, y],
+            &text,
+            COLUMN - 2.0 * MARGIN - 22.0,
+            TextStyle::default(),
+        );
     }
     if groups.len() > NAMED {
         y += 10.0;
-        canvas.line([MARGIN + 4.0, y - 2.6], [MARGIN + 18.0, y - 2.6], pen(NAMED));
+        canvas.line(
+            [MARGIN + 4.0, y - 2.6],
+            [MARGIN + 18.0, y - 2.6],
+            pen(NAMED),
+        );
         let text = format!("and {} more", groups.len() - NAMED);
-        canvas.text([MARGIN + 22.0, y], &text, TextStyle::default().colour(colour::FAINT));
+        canvas.text(
+            [MARGIN + 22.0, y],
+            &text,
+            TextStyle::default().colour(colour::FAINT),
+        );
     }
     y
 }
@@ -151,25 +212,46 @@ fn bands(runs: &[&Progress], quantity: fn(&Moment) -> f64, end: f64) -> Vec<Band
     let first = |run: &&Progress| run.moments.first().map_or(0.0, |moment| moment.evaluations);
     let start = runs.iter().map(first).fold(0.0, f64::max).min(end);
     let at = |k: usize| start + (end - start) * k as f64 / SAMPLES as f64;
-    (0..=SAMPLES).filter_map(|k| band(runs, quantity, at(k))).collect()
+    (0..=SAMPLES)
+        .filter_map(|k| band(runs, quantity, at(k)))
+        .collect()
 }
 
 fn band(runs: &[&Progress], quantity: fn(&Moment) -> f64, at: f64) -> Option<Band> {
     let value = |run: &&Progress| {
-        let after = run.moments.partition_point(|moment| moment.evaluations <= at);
+        let after = run
+            .moments
+            .partition_point(|moment| moment.evaluations <= at);
         run.moments.get(after.saturating_sub(1)).map(quantity)
     };
-    let mut values: Vec<f64> = runs.iter().filter_map(value).filter(|v| v.is_finite()).collect();
+    let mut values: Vec<f64> = runs
+        .iter()
+        .filter_map(value)
+        .filter(|v| v.is_finite())
+        .collect();
     values.sort_by(f64::total_cmp);
     let (low, high) = (*values.first()?, *values.last()?);
     let half = values.len() / 2;
-    let middle = if values.len() % 2 == 1 { values[half] } else { (values[half - 1] + values[half]) / 2.0 };
-    Some(Band { at, low, middle, high })
+    let middle = if values.len() % 2 == 1 {
+        values[half]
+    } else {
+        (values[half - 1] + values[half]) / 2.0
+    };
+    Some(Band {
+        at,
+        low,
+        middle,
+        high,
+    })
 }
 
 fn draw(canvas: &mut Canvas, plot: &Plot, bands: &[Band], pen: Pen, is_band: bool) {
-    let line =
-        |of: fn(&Band) -> f64| bands.iter().map(|band| plot.place([band.at, of(band)])).collect::<Vec<_>>();
+    let line = |of: fn(&Band) -> f64| {
+        bands
+            .iter()
+            .map(|band| plot.place([band.at, of(band)]))
+            .collect::<Vec<_>>()
+    };
     if is_band && !bands.is_empty() {
         let mut edge = line(|band| band.low);
         edge.extend(line(|band| band.high).into_iter().rev());
@@ -202,11 +284,22 @@ mod tests {
 
     #[test]
     fn a_band_holds_the_runs_and_its_middle_is_their_median() {
-        let runs =
-            [run(1, &[None, Some(1.0)]), run(2, &[Some(2.0), Some(5.0)]), run(3, &[Some(4.0), Some(9.0)])];
+        let runs = [
+            run(1, &[None, Some(1.0)]),
+            run(2, &[Some(2.0), Some(5.0)]),
+            run(3, &[Some(4.0), Some(9.0)]),
+        ];
         let best = QUANTITIES[2].1;
         let all: Vec<&Progress> = runs.iter().collect();
-        assert_eq!(band(&all, best, 40.0), Some(Band { at: 40.0, low: 1.0, middle: 5.0, high: 9.0 }));
+        assert_eq!(
+            band(&all, best, 40.0),
+            Some(Band {
+                at: 40.0,
+                low: 1.0,
+                middle: 5.0,
+                high: 9.0
+            })
+        );
         assert_eq!(band(&all, best, 39.9).unwrap().middle, 3.0);
         assert_eq!(band(&all[..1], best, 20.0), None);
         assert_eq!(names(&runs), "toy, seeds 1, 2, 3");
@@ -215,8 +308,13 @@ mod tests {
     #[test]
     fn runs_of_other_settings_have_lines_and_names_of_their_own() {
         let of = |parents: i64| {
-            let settings = [("map_elites.parents".to_string(), parents.into())].into_iter().collect();
-            Progress { settings, ..run(1, &[Some(1.0), Some(2.0)]) }
+            let settings = [("map_elites.parents".to_string(), parents.into())]
+                .into_iter()
+                .collect();
+            Progress {
+                settings,
+                ..run(1, &[Some(1.0), Some(2.0)])
+            }
         };
         let runs: Vec<Progress> = (0..30).map(of).collect();
         let svg = progress(&runs[..2]).svg();
@@ -228,7 +326,9 @@ mod tests {
 
     #[test]
     fn lines_with_a_name_look_different() {
-        let mut pens: Vec<String> = (0..=NAMED).map(|number| format!("{:?}", pen(number))).collect();
+        let mut pens: Vec<String> = (0..=NAMED)
+            .map(|number| format!("{:?}", pen(number)))
+            .collect();
         pens.sort();
         pens.dedup();
         assert_eq!(pens.len(), 25);
@@ -237,7 +337,10 @@ mod tests {
 
     #[test]
     fn runs_without_elites_or_of_one_generation_are_drawn() {
-        for runs in [vec![run(1, &[None])], vec![run(1, &[None, None]), run(2, &[Some(1.0)])]] {
+        for runs in [
+            vec![run(1, &[None])],
+            vec![run(1, &[None, None]), run(2, &[Some(1.0)])],
+        ] {
             assert!(progress(&runs).svg().contains("evaluations"));
         }
     }

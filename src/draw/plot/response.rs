@@ -27,27 +27,56 @@ pub(crate) fn response(found: &RobotResponse, task: Option<&str>, of: &str) -> F
     let cell = MAP / body.height().max(body.width()).max(1) as f64;
     let size = [cell * body.width() as f64, cell * body.height() as f64];
     canvas.frame(at, size, Pen::new(scales::GRID, 0.6));
-    let largest = found.places.iter().map(|place| place.slope.abs()).fold(0.0, f64::max);
+    let largest = found
+        .places
+        .iter()
+        .map(|place| place.slope.abs())
+        .fold(0.0, f64::max);
     let largest = if largest > 0.0 { largest } else { 1.0 };
     let shade = |slope: f64| scales::diverging(slope / largest);
     let is_place = |material: &Material| *material == Material::Soft || material.is_sensor();
-    let others = || body.voxels().iter().filter(|(_, material)| !is_place(material));
+    let others = || {
+        body.voxels()
+            .iter()
+            .filter(|(_, material)| !is_place(material))
+    };
     let fill = |material: &Material| match material {
         Material::Empty => Colour::gray(0.985),
         material => faded(robot::plain(*material)),
     };
     let seam = (0.05 * cell).min(0.5);
-    robot::squares(&mut canvas, at, cell, seam, others().map(|(place, material)| (place, fill(material))));
-    robot::marks(&mut canvas, at, cell, others().map(|(place, material)| (place, *material)), |m| {
-        fill(&m).with_opacity(90)
-    });
-    let places = found.places.iter().map(|place| ((place.row, place.column), shade(place.slope)));
+    robot::squares(
+        &mut canvas,
+        at,
+        cell,
+        seam,
+        others().map(|(place, material)| (place, fill(material))),
+    );
+    robot::marks(
+        &mut canvas,
+        at,
+        cell,
+        others().map(|(place, material)| (place, *material)),
+        |m| fill(&m).with_opacity(90),
+    );
+    let places = found
+        .places
+        .iter()
+        .map(|place| ((place.row, place.column), shade(place.slope)));
     robot::squares(&mut canvas, at, cell, seam, places);
     let crosses: Vec<Piece> = found
         .places
         .iter()
         .filter(|place| place.is_uncertain())
-        .flat_map(|place| cross([at[0] + place.column as f64 * cell, at[1] + place.row as f64 * cell], cell))
+        .flat_map(|place| {
+            cross(
+                [
+                    at[0] + place.column as f64 * cell,
+                    at[1] + place.row as f64 * cell,
+                ],
+                cell,
+            )
+        })
         .collect();
     let uncertain = Pen::new(colour::FAINT, 0.5);
     if !crosses.is_empty() {
@@ -58,15 +87,26 @@ pub(crate) fn response(found: &RobotResponse, task: Option<&str>, of: &str) -> F
     let x = at[0] + MAP + 10.0;
     let room = COLUMN - MARGIN - x;
     let materials = present(body).filter(|material| !is_place(material));
-    let lines: Vec<(Material, Colour, &str)> =
-        materials.map(|m| (m, faded(robot::plain(m)), m.name())).collect();
+    let lines: Vec<(Material, Colour, &str)> = materials
+        .map(|m| (m, faded(robot::plain(m)), m.name()))
+        .collect();
     let mut y = robot::legend(&mut canvas, [x, top], lines, room);
     canvas.frame([x, y], [7.0, 7.0], Pen::new(scales::CELL, 0.4));
     canvas.path(cross([x, y], 7.0).to_vec(), uncertain);
-    canvas.fitted([x + 10.5, y + 6.2], "within 2 errors of 0", room - 10.5, TextStyle::default());
+    canvas.fitted(
+        [x + 10.5, y + 6.2],
+        "within 2 errors of 0",
+        room - 10.5,
+        TextStyle::default(),
+    );
     y += 24.0;
     for note in notes(found, task) {
-        canvas.fitted([x, y], &note, room, TextStyle::default().colour(colour::FAINT));
+        canvas.fitted(
+            [x, y],
+            &note,
+            room,
+            TextStyle::default().colour(colour::FAINT),
+        );
         y += 10.0;
     }
 
@@ -75,13 +115,21 @@ pub(crate) fn response(found: &RobotResponse, task: Option<&str>, of: &str) -> F
     let name = "displacement per rest width of a place [voxel lengths], right positive";
     let bar = COLUMN - 2.0 * MARGIN - 12.0;
     colour_bar(&mut canvas, [MARGIN + 6.0, below], bar, &axis, name, shade);
-    Figure::new(&format!("Response: {of}"), [COLUMN, below + 19.0 + MARGIN], canvas)
+    Figure::new(
+        &format!("Response: {of}"),
+        [COLUMN, below + 19.0 + MARGIN],
+        canvas,
+    )
 }
 
 /// Returns the notes beside the map.
 fn notes(found: &RobotResponse, task: Option<&str>) -> Vec<String> {
     let places = found.places.len();
-    let certain = found.places.iter().filter(|place| !place.is_uncertain()).count();
+    let certain = found
+        .places
+        .iter()
+        .filter(|place| !place.is_uncertain())
+        .count();
     let mut notes = vec![
         format!("{certain} of {places} places certain"),
         format!("R² {}, cross-validated", number::fixed(found.r_squared, 2)),
@@ -89,10 +137,15 @@ fn notes(found: &RobotResponse, task: Option<&str>) -> Vec<String> {
         format!("{} rollouts", found.rollouts),
     ];
     if found.ended_by == EndedBy::Images {
-        notes.push(format!("relative error {}", number::fixed(found.relative_error, 2)));
+        notes.push(format!(
+            "relative error {}",
+            number::fixed(found.relative_error, 2)
+        ));
     }
     if let (Some(taught), Some(task)) = (&found.taught, task) {
-        let [low, high] = taught.accuracy_interval.map(|share| number::fixed(100.0 * share, 0));
+        let [low, high] = taught
+            .accuracy_interval
+            .map(|share| number::fixed(100.0 * share, 0));
         notes.push(format!("{task}: {low}–{high} % correct"));
     }
     notes
@@ -122,8 +175,12 @@ mod tests {
 
     fn found(slopes: [(f64, f64); 3]) -> RobotResponse {
         let places = slopes.into_iter().enumerate();
-        let place =
-            |(column, (slope, error)): (usize, (f64, f64))| ResponsePlace { row: 0, column, slope, error };
+        let place = |(column, (slope, error)): (usize, (f64, f64))| ResponsePlace {
+            row: 0,
+            column,
+            slope,
+            error,
+        };
         RobotResponse {
             displacements: vec![Some(1.0); 60],
             id: "a".to_string(),
@@ -145,19 +202,35 @@ mod tests {
 
     #[test]
     fn places_have_the_colour_of_their_slope_and_the_uncertain_ones_a_cross() {
-        let svg = response(&found([(8.0, 1.0), (-4.0, 1.0), (1.0, 1.0)]), None, "robot a").svg();
+        let svg = response(
+            &found([(8.0, 1.0), (-4.0, 1.0), (1.0, 1.0)]),
+            None,
+            "robot a",
+        )
+        .svg();
         for slope in [1.0, -0.5, 0.125] {
             assert!(svg.contains(&scales::diverging(slope).hex()), "{slope}");
         }
-        let crosses = |svg: &str| svg.matches(&format!("stroke=\"{}\"", colour::FAINT.hex())).count();
+        let crosses = |svg: &str| {
+            svg.matches(&format!("stroke=\"{}\"", colour::FAINT.hex()))
+                .count()
+        };
         // One is the legend's.
         assert_eq!(crosses(&svg), 2);
-        let certain = response(&found([(8.0, 1.0), (-4.0, 1.0), (3.0, 1.0)]), None, "robot a").svg();
+        let certain = response(
+            &found([(8.0, 1.0), (-4.0, 1.0), (3.0, 1.0)]),
+            None,
+            "robot a",
+        )
+        .svg();
         assert_eq!(crosses(&certain), 1);
         assert!(svg.contains("2 of 3 places certain") && certain.contains("3 of 3 places certain"));
         // Other voxels are named; places have a legend of their own.
         assert!(svg.contains("rigid") && svg.contains("antiphase") && !svg.contains("sensor"));
-        assert!(svg.contains("R² 0.88") && svg.contains("relative error 0.31"), "{svg}");
+        assert!(
+            svg.contains("R² 0.88") && svg.contains("relative error 0.31"),
+            "{svg}"
+        );
     }
 
     #[test]
@@ -173,6 +246,10 @@ mod tests {
             accuracy_interval: interval,
             margin: None,
         });
-        assert!(response(&still, Some("4|9"), "robot a").svg().contains("4|9: 61–75 % correct"));
+        assert!(
+            response(&still, Some("4|9"), "robot a")
+                .svg()
+                .contains("4|9: 61–75 % correct")
+        );
     }
 }

@@ -28,9 +28,18 @@ pub(crate) fn squares(
 ) {
     let mut paths = BTreeMap::<([u8; 3], u8), Vec<Piece>>::new();
     for ((row, column), fill) in squares {
-        let (x, y) = (left + column as f64 * cell + seam / 2.0, top + row as f64 * cell + seam / 2.0);
-        let square = Piece::Rectangle { at: [x, y], size: [cell - seam; 2] };
-        paths.entry((fill.rgb, fill.opacity)).or_default().push(square);
+        let (x, y) = (
+            left + column as f64 * cell + seam / 2.0,
+            top + row as f64 * cell + seam / 2.0,
+        );
+        let square = Piece::Rectangle {
+            at: [x, y],
+            size: [cell - seam; 2],
+        };
+        paths
+            .entry((fill.rgb, fill.opacity))
+            .or_default()
+            .push(square);
     }
     for ((rgb, opacity), squares) in paths {
         canvas.area(squares, Colour { rgb, opacity });
@@ -55,21 +64,39 @@ pub(crate) fn marks(
         let (x, y) = (left + column as f64 * cell, top + row as f64 * cell);
         [[x, y], [x + cell, y], [x + cell, y + cell], [x, y + cell]]
     };
-    stroked(canvas, cell, cells.map(|(place, material)| (material, corners(place), fill(material))));
+    stroked(
+        canvas,
+        cell,
+        cells.map(|(place, material)| (material, corners(place), fill(material))),
+    );
 }
 
 /// Draws the marks of voxels, `cell` points wide, as one path for each colour.
-fn stroked(canvas: &mut Canvas, cell: f64, voxels: impl Iterator<Item = (Material, [[f64; 2]; 4], Colour)>) {
+fn stroked(
+    canvas: &mut Canvas,
+    cell: f64,
+    voxels: impl Iterator<Item = (Material, [[f64; 2]; 4], Colour)>,
+) {
     let mut paths = BTreeMap::<([u8; 3], u8), Vec<Piece>>::new();
     for (material, corners, fill) in voxels {
-        let colour = Colour { opacity: fill.opacity, ..colour::mark_colour(material, fill) };
+        let colour = Colour {
+            opacity: fill.opacity,
+            ..colour::mark_colour(material, fill)
+        };
         let lines = paths.entry((colour.rgb, colour.opacity)).or_default();
         for line in colour::mark(material) {
-            lines.push(Piece::Line(line.iter().map(|point| colour::placed(*point, corners)).collect()));
+            lines.push(Piece::Line(
+                line.iter()
+                    .map(|point| colour::placed(*point, corners))
+                    .collect(),
+            ));
         }
     }
     for ((rgb, opacity), lines) in paths.into_iter().filter(|(_, lines)| !lines.is_empty()) {
-        canvas.path(lines, Pen::new(Colour { rgb, opacity }, colour::MARK_WIDTH * cell));
+        canvas.path(
+            lines,
+            Pen::new(Colour { rgb, opacity }, colour::MARK_WIDTH * cell),
+        );
     }
 }
 
@@ -105,19 +132,39 @@ pub(crate) fn outline(
 
 /// Draws the outline of a body.
 pub(crate) fn body_outline(canvas: &mut Canvas, at: [f64; 2], cell: f64, body: &Body, pen: Pen) {
-    outline(canvas, at, cell, [body.height(), body.width()], |r, c| !body.at(r, c).is_empty(), pen);
+    outline(
+        canvas,
+        at,
+        cell,
+        [body.height(), body.width()],
+        |r, c| !body.at(r, c).is_empty(),
+        pen,
+    );
 }
 
 /// Draws a framed stimulus, `side` points on its longer side; returns its width and height.
-pub(crate) fn stimulus(canvas: &mut Canvas, at: [f64; 2], side: f64, image: &Grid<f64>) -> [f64; 2] {
+pub(crate) fn stimulus(
+    canvas: &mut Canvas,
+    at: [f64; 2],
+    side: f64,
+    image: &Grid<f64>,
+) -> [f64; 2] {
     let cell = side / image.height().max(image.width()).max(1) as f64;
     let size = [cell * image.width() as f64, cell * image.height() as f64];
     canvas.rectangle(at, size, Colour::gray(0.0));
     // Sixteen grays suffice here; a negative seam hides the lines between squares.
     let gray = |intensity: f64| Colour::gray((intensity * 15.0).round() / 15.0);
-    let lit = image.iter().map(|(place, intensity)| (place, gray(*intensity)));
+    let lit = image
+        .iter()
+        .map(|(place, intensity)| (place, gray(*intensity)));
     canvas.clipped(at, size, |canvas| {
-        squares(canvas, at, cell, -0.05, lit.filter(|(_, fill)| fill.rgb[0] > 0));
+        squares(
+            canvas,
+            at,
+            cell,
+            -0.05,
+            lit.filter(|(_, fill)| fill.rgb[0] > 0),
+        );
     });
     canvas.frame(at, size, Pen::new(colour::FAINT, 0.5));
     size
@@ -125,14 +172,22 @@ pub(crate) fn stimulus(canvas: &mut Canvas, at: [f64; 2], side: f64, image: &Gri
 
 /// Draws the body at a frame with its outline: voxels in the colour of their material, darker the
 /// smaller they are.
-pub(crate) fn pose(canvas: &mut Canvas, walk: &Walk, frame: usize, place: impl Fn([f64; 2]) -> [f64; 2]) {
+pub(crate) fn pose(
+    canvas: &mut Canvas,
+    walk: &Walk,
+    frame: usize,
+    place: impl Fn([f64; 2]) -> [f64; 2],
+) {
     let [small, _, large] = colour::TONE_AREAS;
     let mut paths = BTreeMap::<[u8; 3], Vec<Piece>>::new();
     for (material, corners) in walk.voxels(frame) {
         let share = (area(&corners) - small) / (large - small);
         let stepped = small + (share * SHADES).round() / SHADES * (large - small);
         let fill = colour::shade(material, stepped);
-        paths.entry(fill.rgb).or_default().push(Piece::Polygon(corners.map(&place).to_vec()));
+        paths
+            .entry(fill.rgb)
+            .or_default()
+            .push(Piece::Polygon(corners.map(&place).to_vec()));
     }
     for (rgb, voxels) in paths {
         canvas.area(voxels, Colour { rgb, opacity: 255 });
@@ -141,11 +196,18 @@ pub(crate) fn pose(canvas: &mut Canvas, walk: &Walk, frame: usize, place: impl F
     if cell >= MARKED {
         let voxels = walk.voxels(frame);
         let on_page = voxels.map(|(material, corners)| {
-            (material, corners.map(&place), colour::shade(material, area(&corners)))
+            (
+                material,
+                corners.map(&place),
+                colour::shade(material, area(&corners)),
+            )
         });
         stroked(canvas, cell, on_page);
     }
-    let rim: Vec<Piece> = walk.outline(frame).map(|side| Piece::Line(side.map(&place).to_vec())).collect();
+    let rim: Vec<Piece> = walk
+        .outline(frame)
+        .map(|side| Piece::Line(side.map(&place).to_vec()))
+        .collect();
     if !rim.is_empty() {
         canvas.path(rim, Pen::new(colour::INK, 0.5));
     }
@@ -162,9 +224,20 @@ pub(crate) fn legend<'a>(
     let mut top = y;
     for (material, fill, text) in lines {
         canvas.rectangle([x, top], [7.0, 7.0], fill);
-        marks(canvas, [x, top], 7.0, std::iter::once(((0, 0), material)), |_| fill);
+        marks(
+            canvas,
+            [x, top],
+            7.0,
+            std::iter::once(((0, 0), material)),
+            |_| fill,
+        );
         canvas.frame([x, top], [7.0, 7.0], Pen::new(scales::CELL, 0.4));
-        canvas.fitted([x + 10.5, top + 6.2], text, most - 10.5, TextStyle::default());
+        canvas.fitted(
+            [x + 10.5, top + 6.2],
+            text,
+            most - 10.5,
+            TextStyle::default(),
+        );
         top += LINE;
     }
     top

@@ -90,9 +90,12 @@ mod tests {
         assert_eq!(sequential(2.0).rgb, VIRIDIS[10]);
         assert_eq!(sequential(f64::NAN).rgb, VIRIDIS[0]);
         assert_eq!(diverging(0.0).rgb, [0xf7; 3]);
-        let level =
-            |c: Colour| 0.21 * f64::from(c.rgb[0]) + 0.72 * f64::from(c.rgb[1]) + 0.07 * f64::from(c.rgb[2]);
-        let levels: Vec<f64> = (0..=20).map(|i| level(sequential(f64::from(i) / 20.0))).collect();
+        let level = |c: Colour| {
+            0.21 * f64::from(c.rgb[0]) + 0.72 * f64::from(c.rgb[1]) + 0.07 * f64::from(c.rgb[2])
+        };
+        let levels: Vec<f64> = (0..=20)
+            .map(|i| level(sequential(f64::from(i) / 20.0)))
+            .collect();
         assert!(levels.windows(2).all(|w| w[0] < w[1]), "{levels:?}");
     }
 }

@@ -24,35 +24,57 @@ const FAINTEST: f64 = 0.22;
 ///
 /// # Errors
 /// Returns [`PictureError::Recording`] if the recording cannot be drawn.
-pub(crate) fn snapshots(recording: &Recording, every: usize, of: &str) -> Result<Figure, PictureError> {
+pub(crate) fn snapshots(
+    recording: &Recording,
+    every: usize,
+    of: &str,
+) -> Result<Figure, PictureError> {
     let walk = Walk::new(recording)?;
     let phases = recording.phases.len();
     let (columns, width) = if phases <= 3 { (1, COLUMN) } else { (2, PAGE) };
     let every = if every == 0 { suitable(&walk) } else { every };
     let mut canvas = Canvas::new();
-    let is_rest = (0..phases).any(|phase| !(walk.phase_frames(phase).len() - 1).is_multiple_of(every));
+    let is_rest =
+        (0..phases).any(|phase| !(walk.phase_frames(phase).len() - 1).is_multiple_of(every));
     let rest = if is_rest { ", and the last" } else { "" };
     let title = format!("Snapshots every {every} control steps{rest}");
     let top = heading(&mut canvas, &title, of, width);
     let wide = (width - 2.0 * MARGIN - (columns - 1) as f64 * 12.0) / columns as f64;
     // All panels share one scale; each begins where its walk does.
     let reach = (0..phases).map(|phase| reach(&walk, phase));
-    let [left, right, highest] =
-        reach.fold([0.0, 0.0, 1.0f64], |a, b| [a[0].min(b[0]), a[1].max(b[1]), a[2].max(b[2])]);
+    let [left, right, highest] = reach.fold([0.0, 0.0, 1.0f64], |a, b| {
+        [a[0].min(b[0]), a[1].max(b[1]), a[2].max(b[2])]
+    });
     let plot_width = wide - STIMULUS - 8.0;
     let scale = (plot_width / (right - left + 2.0)).min(LARGEST);
-    let x =
-        Axis::exact((left + right - plot_width / scale) / 2.0, (left + right + plot_width / scale) / 2.0, 6);
+    let x = Axis::exact(
+        (left + right - plot_width / scale) / 2.0,
+        (left + right + plot_width / scale) / 2.0,
+        6,
+    );
     let high = (highest + 0.5) * scale;
     let panel_height = 10.0 + high.max(STIMULUS - 6.0) + 12.0;
     for phase in 0..phases {
         let (row, column) = (phase / columns, phase % columns);
-        let at = [MARGIN + column as f64 * (wide + 12.0), top + row as f64 * (panel_height + GAP)];
+        let at = [
+            MARGIN + column as f64 * (wide + 12.0),
+            top + row as f64 * (panel_height + GAP),
+        ];
         let label = &recording.phases[phase].seen.label;
         let d = signed(recording.phases[phase].displacement);
         let text = format!("{label}: {d} voxel lengths");
-        canvas.fitted([at[0] + STIMULUS + 8.0, at[1] + 7.0], &text, plot_width, TextStyle::default().bold());
-        robot::stimulus(&mut canvas, [at[0], at[1] + 1.0], STIMULUS, &recording.phases[phase].seen.stimulus);
+        canvas.fitted(
+            [at[0] + STIMULUS + 8.0, at[1] + 7.0],
+            &text,
+            plot_width,
+            TextStyle::default().bold(),
+        );
+        robot::stimulus(
+            &mut canvas,
+            [at[0], at[1] + 1.0],
+            STIMULUS,
+            &recording.phases[phase].seen.stimulus,
+        );
         let plot = Plot {
             at: [at[0] + STIMULUS + 8.0, at[1] + panel_height - 12.0 - high],
             size: [plot_width, high],
@@ -62,9 +84,17 @@ pub(crate) fn snapshots(recording: &Recording, every: usize, of: &str) -> Result
         panel(&mut canvas, &walk, phase, every, &plot);
     }
     let below = top + phases.div_ceil(columns) as f64 * (panel_height + GAP);
-    let note = if recording.unstable { "ended early: unstable" } else { "x [voxel lengths] from the start" };
+    let note = if recording.unstable {
+        "ended early: unstable"
+    } else {
+        "x [voxel lengths] from the start"
+    };
     canvas.text([width / 2.0, below + 2.0], note, TextStyle::middle());
-    Ok(Figure::new(&format!("Snapshots: {of}"), [width, below + 4.0 + MARGIN], canvas))
+    Ok(Figure::new(
+        &format!("Snapshots: {of}"),
+        [width, below + 4.0 + MARGIN],
+        canvas,
+    ))
 }
 
 /// Returns the steps in which the robot moves half its width, at least a tenth of the longest
@@ -73,8 +103,14 @@ fn suitable(walk: &Walk) -> usize {
     let size = walk.extent(0..1);
     let half = 0.5 * (size.right - size.left).max(1.0);
     let phases = &walk.recording().phases;
-    let farthest = phases.iter().map(|phase| phase.displacement.abs()).fold(0.0, f64::max);
-    let longest = (0..phases.len()).map(|phase| walk.phase_frames(phase).len()).max().unwrap_or(1);
+    let farthest = phases
+        .iter()
+        .map(|phase| phase.displacement.abs())
+        .fold(0.0, f64::max);
+    let longest = (0..phases.len())
+        .map(|phase| walk.phase_frames(phase).len())
+        .max()
+        .unwrap_or(1);
     let poses = (farthest / half).round().clamp(2.0, 6.0);
     let cycle = walk.recording().cycle.max(1);
     // Whole cycles, so that all poses have the same muscle phase.
@@ -92,7 +128,12 @@ fn reach(walk: &Walk, phase: usize) -> [f64; 3] {
     // A body that is thrown apart does not decide the scale.
     let low = (all.left - zero).max(centres().fold(0.0, f64::min) - size);
     let high = (all.right - zero).min(centres().fold(0.0, f64::max) + size);
-    [low, high, all.top.min(2.0 * walk.recording().body.height() as f64 + 2.0)]
+    [
+        low,
+        high,
+        all.top
+            .min(2.0 * walk.recording().body.height() as f64 + 2.0),
+    ]
 }
 
 fn panel(canvas: &mut Canvas, walk: &Walk, phase: usize, every: usize, plot: &Plot) {
@@ -107,24 +148,44 @@ fn panel(canvas: &mut Canvas, walk: &Walk, phase: usize, every: usize, plot: &Pl
         shown.push(last);
     }
     let [left, bottom] = [plot.at[0], plot.at[1] + plot.size[1]];
-    canvas.clipped([left, plot.at[1] - 1.0], [plot.size[0], plot.size[1] + 1.0], |canvas| {
-        for (k, frame) in shown.iter().enumerate() {
-            let share = (k + 1) as f64 / shown.len() as f64;
-            canvas.faded(FAINTEST + (1.0 - FAINTEST) * share * share, |canvas| {
-                robot::pose(canvas, walk, *frame, place);
-            });
-        }
-        let path: Vec<[f64; 2]> = frames.clone().step_by(2).map(|frame| place(walk.centre(frame))).collect();
-        canvas.polyline(&path, Pen::new(colour::PAPER.with_opacity(190), 1.8));
-        canvas.polyline(&path, Pen::new(colour::TRACE, 0.8));
-    });
-    canvas.line([left, bottom], [left + plot.size[0], bottom], Pen::new(colour::GROUND_LINE, 0.9));
+    canvas.clipped(
+        [left, plot.at[1] - 1.0],
+        [plot.size[0], plot.size[1] + 1.0],
+        |canvas| {
+            for (k, frame) in shown.iter().enumerate() {
+                let share = (k + 1) as f64 / shown.len() as f64;
+                canvas.faded(FAINTEST + (1.0 - FAINTEST) * share * share, |canvas| {
+                    robot::pose(canvas, walk, *frame, place);
+                });
+            }
+            let path: Vec<[f64; 2]> = frames
+                .clone()
+                .step_by(2)
+                .map(|frame| place(walk.centre(frame)))
+                .collect();
+            canvas.polyline(&path, Pen::new(colour::PAPER.with_opacity(190), 1.8));
+            canvas.polyline(&path, Pen::new(colour::TRACE, 0.8));
+        },
+    );
+    canvas.line(
+        [left, bottom],
+        [left + plot.size[0], bottom],
+        Pen::new(colour::GROUND_LINE, 0.9),
+    );
     for tick in plot.x.ticks() {
         let x = plot.place([tick, 0.0])[0];
-        canvas.line([x, bottom], [x, bottom + 2.5], Pen::new(colour::GROUND_LINE, 0.6));
+        canvas.line(
+            [x, bottom],
+            [x, bottom + 2.5],
+            Pen::new(colour::GROUND_LINE, 0.6),
+        );
         // Leaves out numbers that would extend beyond the panel.
         if (left + 4.0..left + plot.size[0] - 4.0).contains(&x) {
-            canvas.text([x, bottom + 4.0 + 0.72 * TEXT], &plot.x.label(tick), TextStyle::middle());
+            canvas.text(
+                [x, bottom + 4.0 + 0.72 * TEXT],
+                &plot.x.label(tick),
+                TextStyle::middle(),
+            );
         }
     }
 }
@@ -151,7 +212,12 @@ mod tests {
         recording.frames[4].points[1] = [1e8, -1e8];
         recording.frames[5].centre = [f64::INFINITY; 2];
         recording.unstable = true;
-        assert!(snapshots(&recording, 1, "x").unwrap().svg().contains("unstable"));
+        assert!(
+            snapshots(&recording, 1, "x")
+                .unwrap()
+                .svg()
+                .contains("unstable")
+        );
         recording.frames.truncate(1);
         assert!(snapshots(&recording, 0, "x").is_ok());
     }

@@ -45,26 +45,46 @@ pub(crate) fn spacetime(recording: &Recording, of: &str) -> Result<Figure, Pictu
     let top = heading(&mut canvas, "Position over time", of, width);
     let x = positions(&walk, &rollouts, columns);
     let grays = grays(&walk, &rollouts, &x);
-    let longest = rollouts.iter().map(|rollout| rollout.len() - 1).max().unwrap_or(1).max(1);
+    let longest = rollouts
+        .iter()
+        .map(|rollout| rollout.len() - 1)
+        .max()
+        .unwrap_or(1)
+        .max(1);
     let cycle = recording.cycle.max(1) as f64;
     let y = Axis::exact(0.0, longest as f64 / cycle, 5);
     let height = (PER_STEP * longest as f64).clamp(HEIGHTS[0], HEIGHTS[1]);
     let left = MARGIN + left_space(y.labels_width());
     // A single rollout has its stimuli beside it, several have them above.
-    let (beside, above) = if rollouts.len() == 1 { (STIMULUS + 8.0, 4.0) } else { (0.0, STIMULUS + 6.0) };
+    let (beside, above) = if rollouts.len() == 1 {
+        (STIMULUS + 8.0, 4.0)
+    } else {
+        (0.0, STIMULUS + 6.0)
+    };
     let gap = 8.0;
     let wide = (width - MARGIN - 4.0 - left - beside - gap * (columns - 1) as f64) / columns as f64;
     let row_height = above + height + AXIS + 6.0;
     for (k, rollout) in rollouts.iter().enumerate() {
-        let at =
-            [left + (k % columns) as f64 * (wide + gap), top + above + (k / columns) as f64 * row_height];
-        let plot = Plot { at, size: [wide, height], x: x.clone(), y: y.clone() };
+        let at = [
+            left + (k % columns) as f64 * (wide + gap),
+            top + above + (k / columns) as f64 * row_height,
+        ];
+        let plot = Plot {
+            at,
+            size: [wide, height],
+            x: x.clone(),
+            y: y.clone(),
+        };
         rows(&mut canvas, &walk, rollout, &plot, grays);
         stimuli(&mut canvas, &walk, rollout, &plot, rollouts.len() == 1);
         axes(&mut canvas, &plot, k % columns == 0);
     }
     let bottom = top + rollouts.len().div_ceil(columns) as f64 * row_height;
-    Ok(Figure::new(&format!("Position over time: {of}"), [width, bottom + MARGIN - 4.0], canvas))
+    Ok(Figure::new(
+        &format!("Position over time: {of}"),
+        [width, bottom + MARGIN - 4.0],
+        canvas,
+    ))
 }
 
 /// Returns an axis that holds all rollouts, each measured from its start.
@@ -75,9 +95,15 @@ fn positions(walk: &Walk, rollouts: &[Range<usize>], columns: usize) -> Axis {
         let all = walk.extent(rollout.clone());
         let centres = || rollout.clone().map(|frame| walk.centre(frame)[0] - zero);
         let low = (all.left - zero).max(centres().fold(0.0, f64::min) - size);
-        (low, (all.right - zero).min(centres().fold(0.0, f64::max) + size))
+        (
+            low,
+            (all.right - zero).min(centres().fold(0.0, f64::max) + size),
+        )
     };
-    let (low, high) = rollouts.iter().map(reach).fold((0.0f64, 0.0f64), |a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let (low, high) = rollouts
+        .iter()
+        .map(reach)
+        .fold((0.0f64, 0.0f64), |a, b| (a.0.min(b.0), a.1.max(b.1)));
     Axis::exact(low - 1.0, high + 1.0, if columns == 1 { 6 } else { 4 })
 }
 
@@ -98,20 +124,29 @@ fn rows(canvas: &mut Canvas, walk: &Walk, rollout: &Range<usize>, plot: &Plot, g
     let mut paths = vec![Vec::new(); GRAYS];
     let cell = plot.size[0] / CELLS as f64;
     for frame in rollout.clone().step_by(every(rollout)) {
-        let row: Vec<Option<usize>> =
-            areas(walk, frame, zero, &plot.x).into_iter().map(|area| Some(gray(area?, grays))).collect();
+        let row: Vec<Option<usize>> = areas(walk, frame, zero, &plot.x)
+            .into_iter()
+            .map(|area| Some(gray(area?, grays)))
+            .collect();
         let y = moment(plot, (frame - rollout.start) as f64 / cycle) + high / 2.0;
         let mut from = 0;
         for run in row.chunk_by(|a, b| a == b) {
             if let Some(gray) = run[0] {
                 let x = plot.at[0] + cell * from as f64;
-                paths[gray].push(Piece::Level { from: [x, y], length: cell * run.len() as f64 });
+                paths[gray].push(Piece::Level {
+                    from: [x, y],
+                    length: cell * run.len() as f64,
+                });
             }
             from += run.len();
         }
     }
     canvas.clipped(plot.at, plot.size, |canvas| {
-        for (gray, lines) in paths.into_iter().enumerate().filter(|(_, lines)| !lines.is_empty()) {
+        for (gray, lines) in paths
+            .into_iter()
+            .enumerate()
+            .filter(|(_, lines)| !lines.is_empty())
+        {
             let level = DARKEST + (LIGHTEST - DARKEST) * gray as f64 / (GRAYS - 1) as f64;
             // Slightly higher than a row, so that no light shines through.
             canvas.path(lines, Pen::new(Colour::gray(level), high + 0.12));
@@ -138,7 +173,11 @@ fn grays(walk: &Walk, rollouts: &[Range<usize>], x: &Axis) -> [f64; 2] {
         }
     }
     all.sort_by(f64::total_cmp);
-    let quantile = |share: f64| all.get((share * all.len() as f64) as usize).copied().unwrap_or(1.0);
+    let quantile = |share: f64| {
+        all.get((share * all.len() as f64) as usize)
+            .copied()
+            .unwrap_or(1.0)
+    };
     let (low, high) = (quantile(0.03), quantile(0.97));
     // Keeps a body that hardly changes from looking as if it did.
     let least = (0.2 - (high - low)).max(0.0) / 2.0;
@@ -164,7 +203,9 @@ fn areas(walk: &Walk, frame: usize, zero: f64, axis: &Axis) -> Vec<Option<f64>> 
             (*sum, *count) = (*sum + area(&corners), *count + 1);
         }
     }
-    sums.into_iter().map(|(sum, count)| (count > 0).then(|| sum / f64::from(count))).collect()
+    sums.into_iter()
+        .map(|(sum, count)| (count > 0).then(|| sum / f64::from(count)))
+        .collect()
 }
 
 fn stimuli(canvas: &mut Canvas, walk: &Walk, rollout: &Range<usize>, plot: &Plot, beside: bool) {
@@ -172,11 +213,20 @@ fn stimuli(canvas: &mut Canvas, walk: &Walk, rollout: &Range<usize>, plot: &Plot
     let cycle = recording.cycle.max(1) as f64;
     let [left, top] = plot.at;
     let right = left + plot.size[0];
-    for (k, phase) in recording.phases.iter().enumerate().filter(|(_, p)| rollout.contains(&p.first_frame)) {
+    for (k, phase) in recording
+        .phases
+        .iter()
+        .enumerate()
+        .filter(|(_, p)| rollout.contains(&p.first_frame))
+    {
         let words = format!("{} vl", signed(phase.displacement));
         let y = moment(plot, (phase.first_frame - rollout.start) as f64 / cycle);
         if phase.first_frame > rollout.start {
-            canvas.line([left, y], [right + STIMULUS + 8.0, y], Pen::new(colour::INK, 0.7).dashed(3.0, 2.0));
+            canvas.line(
+                [left, y],
+                [right + STIMULUS + 8.0, y],
+                Pen::new(colour::INK, 0.7).dashed(3.0, 2.0),
+            );
         }
         if beside {
             let at = [right + 6.0, y + 3.0];
@@ -186,8 +236,18 @@ fn stimuli(canvas: &mut Canvas, walk: &Walk, rollout: &Range<usize>, plot: &Plot
                 robot::stimulus(canvas, at, STIMULUS, &phase.seen.stimulus);
             }
             if room >= STIMULUS + 18.0 {
-                let name = phase.seen.label.split(' ').next().expect("a split text has a first piece");
-                canvas.fitted([at[0], at[1] + STIMULUS + 8.0], name, STIMULUS, TextStyle::default().bold());
+                let name = phase
+                    .seen
+                    .label
+                    .split(' ')
+                    .next()
+                    .expect("a split text has a first piece");
+                canvas.fitted(
+                    [at[0], at[1] + STIMULUS + 8.0],
+                    name,
+                    STIMULUS,
+                    TextStyle::default().bold(),
+                );
                 canvas.fitted(
                     [at[0], at[1] + STIMULUS + 17.0],
                     &signed(phase.displacement),
@@ -196,11 +256,26 @@ fn stimuli(canvas: &mut Canvas, walk: &Walk, rollout: &Range<usize>, plot: &Plot
                 );
             }
         } else {
-            let size = robot::stimulus(canvas, [left, top - STIMULUS - 4.0], STIMULUS, &phase.seen.stimulus);
+            let size = robot::stimulus(
+                canvas,
+                [left, top - STIMULUS - 4.0],
+                STIMULUS,
+                &phase.seen.stimulus,
+            );
             let x = left + size[0] + 4.0;
             let most = plot.size[0] - size[0] - 4.0;
-            canvas.fitted([x, top - STIMULUS + 4.0], &phase.seen.label, most, TextStyle::default().bold());
-            canvas.fitted([x, top - STIMULUS + 14.0], &words, most, TextStyle::default());
+            canvas.fitted(
+                [x, top - STIMULUS + 4.0],
+                &phase.seen.label,
+                most,
+                TextStyle::default().bold(),
+            );
+            canvas.fitted(
+                [x, top - STIMULUS + 14.0],
+                &words,
+                most,
+                TextStyle::default(),
+            );
         }
     }
 }
@@ -214,13 +289,24 @@ fn axes(canvas: &mut Canvas, plot: &Plot, is_first: bool) {
         let y = moment(plot, tick);
         canvas.line([left - 2.5, y], [left, y], pen);
         if is_first {
-            canvas.text([left - 4.5, y + 0.36 * TEXT], &plot.y.label(tick), TextStyle::end());
+            canvas.text(
+                [left - 4.5, y + 0.36 * TEXT],
+                &plot.y.label(tick),
+                TextStyle::end(),
+            );
         }
     }
     if is_first {
         let x = left - 8.5 - plot.y.labels_width();
-        let words = TextStyle { upwards: true, ..TextStyle::middle() };
-        canvas.text([x, top + plot.size[1] / 2.0], "time [actuation cycles]", words);
+        let words = TextStyle {
+            upwards: true,
+            ..TextStyle::middle()
+        };
+        canvas.text(
+            [x, top + plot.size[1] / 2.0],
+            "time [actuation cycles]",
+            words,
+        );
     }
 }
 
@@ -234,7 +320,10 @@ mod tests {
         let panels = |fresh| {
             let recording = simulated("3344/5566", 3, 60, fresh);
             let svg = spacetime(&recording, "robot x").unwrap().svg();
-            (svg.matches("x [voxel lengths]").count(), svg.matches("stroke-dasharray").count())
+            (
+                svg.matches("x [voxel lengths]").count(),
+                svg.matches("stroke-dasharray").count(),
+            )
         };
         assert_eq!((panels(true), panels(false)), ((3, 0), (1, 2)));
     }
@@ -243,14 +332,20 @@ mod tests {
     fn compressed_columns_are_darker() {
         let mut recording = simulated("33", 1, 2, false);
         recording.frames[1] = recording.frames[0].clone();
-        recording.frames[1].points.iter_mut().for_each(|p| p[1] *= 0.5);
+        recording.frames[1]
+            .points
+            .iter_mut()
+            .for_each(|p| p[1] *= 0.5);
         let walk = Walk::new(&recording).unwrap();
         let x = Axis::exact(-2.0, 2.0, 3);
         let zero = walk.centre(0)[0];
         let middle = |frame| areas(&walk, frame, zero, &x)[CELLS / 2].unwrap();
         assert!(middle(1) < middle(0), "{:?} {:?}", middle(1), middle(0));
         assert_eq!(areas(&walk, 0, zero, &x)[0], None);
-        assert_eq!([0.2, 1.0, 9.0].map(|area| gray(area, [0.5, 1.5])), [0, 3, GRAYS - 1]);
+        assert_eq!(
+            [0.2, 1.0, 9.0].map(|area| gray(area, [0.5, 1.5])),
+            [0, 3, GRAYS - 1]
+        );
     }
 
     #[test]

@@ -8,7 +8,10 @@ use std::fmt;
 impl Canvas {
     /// Returns the elements as SVG.
     pub fn svg(&self) -> String {
-        self.elements().iter().map(|element| format!("{element}\n")).collect()
+        self.elements()
+            .iter()
+            .map(|element| format!("{element}\n"))
+            .collect()
     }
 }
 
@@ -24,14 +27,22 @@ impl fmt::Display for Element {
                 )
             }
             Element::Path { pieces, ink } => {
-                let join = if matches!(ink, Ink::Line(_)) { " stroke-linejoin=\"round\"" } else { "" };
+                let join = if matches!(ink, Ink::Line(_)) {
+                    " stroke-linejoin=\"round\""
+                } else {
+                    ""
+                };
                 write!(out, "<path d=\"")?;
                 pieces.iter().try_for_each(|piece| write!(out, "{piece}"))?;
                 write!(out, "\"{}{join}/>", attributes(ink))
             }
             Element::Dot { at, radius, fill } => {
                 let ([x, y], radius) = (at.map(number), number(*radius));
-                write!(out, "<circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\"{}/>", filled(*fill))
+                write!(
+                    out,
+                    "<circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\"{}/>",
+                    filled(*fill)
+                )
             }
             Element::Text { at, text, words } => {
                 let [x, y] = at.map(number);
@@ -40,9 +51,16 @@ impl fmt::Display for Element {
                     Anchor::Middle => " text-anchor=\"middle\"",
                     Anchor::End => " text-anchor=\"end\"",
                 };
-                let bold = if words.bold { " font-weight=\"bold\"" } else { "" };
-                let turn =
-                    if words.upwards { format!(" transform=\"rotate(-90 {x} {y})\"") } else { String::new() };
+                let bold = if words.bold {
+                    " font-weight=\"bold\""
+                } else {
+                    ""
+                };
+                let turn = if words.upwards {
+                    format!(" transform=\"rotate(-90 {x} {y})\"")
+                } else {
+                    String::new()
+                };
                 let (size, fill, text) = (number(words.size), filled(words.colour), escape(text));
                 write!(
                     out,
@@ -50,7 +68,12 @@ impl fmt::Display for Element {
                 )
             }
             Element::Faded { opacity, content } => {
-                write!(out, "<g opacity=\"{}\">\n{}</g>", number(*opacity), content.svg())
+                write!(
+                    out,
+                    "<g opacity=\"{}\">\n{}</g>",
+                    number(*opacity),
+                    content.svg()
+                )
             }
             Element::Clipped { at, size, content } => {
                 let ([x, y], [width, height]) = (at.map(number), size.map(number));
@@ -72,7 +95,9 @@ impl fmt::Display for Piece {
         let through = |out: &mut fmt::Formatter, points: &[[f64; 2]]| {
             let letters = std::iter::once('M').chain(std::iter::repeat('L'));
             let places = points.iter().map(|point| point.map(number));
-            letters.zip(places).try_for_each(|(letter, [x, y])| write!(out, "{letter}{x} {y}"))
+            letters
+                .zip(places)
+                .try_for_each(|(letter, [x, y])| write!(out, "{letter}{x} {y}"))
         };
         match self {
             Piece::Line(points) => through(out, points),
@@ -116,10 +141,18 @@ pub(crate) fn escape(text: &str) -> String {
 fn attributes(ink: &Ink) -> String {
     match ink {
         Ink::Fill(fill) => filled(*fill),
-        Ink::Line(Pen { colour, width, dashes }) => {
+        Ink::Line(Pen {
+            colour,
+            width,
+            dashes,
+        }) => {
             let dashes = dashes.map(|lengths| lengths.map(number));
             let dashes = dashes.map(|[dash, gap]| format!(" stroke-dasharray=\"{dash} {gap}\""));
-            let (stroke, opacity, width) = (colour.hex(), opacity("stroke-opacity", *colour), number(*width));
+            let (stroke, opacity, width) = (
+                colour.hex(),
+                opacity("stroke-opacity", *colour),
+                number(*width),
+            );
             let dashes = dashes.unwrap_or_default();
             format!(" fill=\"none\" stroke=\"{stroke}\"{opacity} stroke-width=\"{width}\"{dashes}")
         }
@@ -151,15 +184,37 @@ mod tests {
         canvas.frame([1.0, 2.0], [3.0, 4.0], pen.dashed(3.0, 2.0));
         canvas.line([0.0, 0.0], [1.0, 1.0], pen);
         let [square, level] = [
-            Piece::Rectangle { at: [1.0, 2.0], size: [3.0, 4.0] },
-            Piece::Level { from: [5.0, 6.0], length: 7.0 },
+            Piece::Rectangle {
+                at: [1.0, 2.0],
+                size: [3.0, 4.0],
+            },
+            Piece::Level {
+                from: [5.0, 6.0],
+                length: 7.0,
+            },
         ];
-        canvas
-            .area(vec![square, level, Piece::Polygon(vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])], colour::INK);
+        canvas.area(
+            vec![
+                square,
+                level,
+                Piece::Polygon(vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]),
+            ],
+            colour::INK,
+        );
         canvas.dot([1.0, 2.0], 3.0, colour::INK);
-        canvas.text([1.0, 2.0], "a\n&", TextStyle { upwards: true, ..TextStyle::middle() }.bold());
+        canvas.text(
+            [1.0, 2.0],
+            "a\n&",
+            TextStyle {
+                upwards: true,
+                ..TextStyle::middle()
+            }
+            .bold(),
+        );
         canvas.clipped([1.0, 2.0], [3.0, 4.0], |canvas| {
-            canvas.faded(0.25, |canvas| canvas.text([1.0, 2.0], "b", TextStyle::end()));
+            canvas.faded(0.25, |canvas| {
+                canvas.text([1.0, 2.0], "b", TextStyle::end())
+            });
         });
         let expected = r##"<rect x="1" y="2" width="3" height="4.5" fill="#ffffff"/>
 <rect x="1" y="2" width="3" height="4" fill="none" stroke="#222428" stroke-opacity="0.2" stroke-width="0.5" stroke-dasharray="3 2"/>
@@ -178,12 +233,21 @@ mod tests {
 
     #[test]
     fn numbers_are_short_and_always_drawable() {
-        assert_eq!([0.0, -0.001, 1.5, 2.0, 3.1459].map(number), ["0", "0", "1.5", "2", "3.15"]);
-        assert_eq!([f64::NAN, f64::INFINITY, -1e300].map(number), ["0", "1000000", "-1000000"]);
+        assert_eq!(
+            [0.0, -0.001, 1.5, 2.0, 3.1459].map(number),
+            ["0", "0", "1.5", "2", "3.15"]
+        );
+        assert_eq!(
+            [f64::NAN, f64::INFINITY, -1e300].map(number),
+            ["0", "1000000", "-1000000"]
+        );
     }
 
     #[test]
     fn any_text_is_fit_for_xml() {
-        assert_eq!(escape("a<b>&\"c\u{0}\n"), "a&lt;b&gt;&amp;&quot;c\u{fffd}\u{fffd}");
+        assert_eq!(
+            escape("a<b>&\"c\u{0}\n"),
+            "a&lt;b&gt;&amp;&quot;c\u{fffd}\u{fffd}"
+        );
     }
 }

@@ -25,33 +25,70 @@ pub(crate) fn sweep(name: &str, rows: &[SweepRow]) -> Option<Figure> {
     let mut lines: Vec<Line> = Vec::new();
     let mut images = None;
     for row in rows {
-        let Some((run, tested)) = row.run.as_ref().and_then(|run| Some((run, run.tested.as_ref()?))) else {
+        let Some((run, tested)) = row
+            .run
+            .as_ref()
+            .and_then(|run| Some((run, run.tested.as_ref()?)))
+        else {
             continue;
         };
         images = Some((tested.images, tested.split));
         let about = about(row, &run.recognises);
-        let dot =
-            (100.0 * tested.accuracy, tested.interval.map(|interval| interval.map(|share| 100.0 * share)));
+        let dot = (
+            100.0 * tested.accuracy,
+            tested
+                .interval
+                .map(|interval| interval.map(|share| 100.0 * share)),
+        );
         match lines.iter_mut().find(|line| line.about == about) {
             Some(line) => line.dots.push(dot),
-            None => lines.push(Line { about, dots: vec![dot] }),
+            None => lines.push(Line {
+                about,
+                dots: vec![dot],
+            }),
         }
     }
     let (images, split) = images?;
     let mut canvas = Canvas::new();
-    let top = heading(&mut canvas, &format!("Accuracy on {images} {split} images"), name, COLUMN) + 2.0;
-    let names = lines.iter().map(|line| fonts::width(&line.about, TEXT, false)).fold(0.0, f64::max).min(MOST);
+    let top = heading(
+        &mut canvas,
+        &format!("Accuracy on {images} {split} images"),
+        name,
+        COLUMN,
+    ) + 2.0;
+    let names = lines
+        .iter()
+        .map(|line| fonts::width(&line.about, TEXT, false))
+        .fold(0.0, f64::max)
+        .min(MOST);
     let left = MARGIN + names + 5.0;
-    let low = |(accuracy, interval): &(f64, Option<[f64; 2]>)| interval.map_or(*accuracy, |[low, _]| low);
-    let lowest = lines.iter().flat_map(|line| line.dots.iter().map(low)).fold(90.0, f64::min);
-    let size = [COLUMN - MARGIN - 8.0 - left, LINE * lines.len() as f64 + 4.0];
+    let low =
+        |(accuracy, interval): &(f64, Option<[f64; 2]>)| interval.map_or(*accuracy, |[low, _]| low);
+    let lowest = lines
+        .iter()
+        .flat_map(|line| line.dots.iter().map(low))
+        .fold(90.0, f64::min);
+    let size = [
+        COLUMN - MARGIN - 8.0 - left,
+        LINE * lines.len() as f64 + 4.0,
+    ];
     let x = Axis::nice((lowest / 5.0).floor() * 5.0, 100.0, 5);
-    let plot = Plot { at: [left, top], size, x, y: Axis::nice(0.0, 1.0, 1) };
+    let plot = Plot {
+        at: [left, top],
+        size,
+        x,
+        y: Axis::nice(0.0, 1.0, 1),
+    };
     plot.grid(&mut canvas, false, true);
     let at = |value: f64| plot.place([value, 0.0])[0];
     for (number, line) in lines.iter().enumerate() {
         let y = top + 2.0 + LINE * (number as f64 + 0.5);
-        canvas.fitted([left - 4.0, y + 0.36 * TEXT], &line.about, MOST, TextStyle::end());
+        canvas.fitted(
+            [left - 4.0, y + 0.36 * TEXT],
+            &line.about,
+            MOST,
+            TextStyle::end(),
+        );
         for (accuracy, interval) in &line.dots {
             if let Some([low, high]) = interval {
                 canvas.line([at(*low), y], [at(*high), y], Pen::new(scales::BLUE, 0.8));
@@ -59,9 +96,13 @@ pub(crate) fn sweep(name: &str, rows: &[SweepRow]) -> Option<Figure> {
             canvas.dot([at(*accuracy), y], 2.0, scales::BLUE);
         }
         if line.dots.len() > 1 {
-            let mean =
-                at(line.dots.iter().map(|(accuracy, _)| accuracy).sum::<f64>() / line.dots.len() as f64);
-            canvas.line([mean, y - 4.0], [mean, y + 4.0], Pen::new(scales::VERMILLION, 1.2));
+            let mean = at(line.dots.iter().map(|(accuracy, _)| accuracy).sum::<f64>()
+                / line.dots.len() as f64);
+            canvas.line(
+                [mean, y - 4.0],
+                [mean, y + 4.0],
+                Pen::new(scales::VERMILLION, 1.2),
+            );
         }
     }
     plot.lower_axis(&mut canvas, Some("accuracy [%]"));
@@ -75,7 +116,11 @@ pub(crate) fn sweep(name: &str, rows: &[SweepRow]) -> Option<Figure> {
             words,
         );
     }
-    Some(Figure::new(&format!("Accuracy: {name}"), [COLUMN, height], canvas))
+    Some(Figure::new(
+        &format!("Accuracy: {name}"),
+        [COLUMN, height],
+        canvas,
+    ))
 }
 
 /// Describes a run without its seed.
@@ -85,5 +130,8 @@ fn about(row: &SweepRow, recognises: &str) -> String {
         key => Some(format!("{}={value}", key.rsplit('.').next().unwrap_or(key))),
     };
     let words = row.varied.iter().filter_map(word);
-    words.chain([recognises.to_string()]).collect::<Vec<_>>().join(", ")
+    words
+        .chain([recognises.to_string()])
+        .collect::<Vec<_>>()
+        .join(", ")
 }

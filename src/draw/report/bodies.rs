@@ -42,7 +42,10 @@ pub(super) fn button(
         escape(&rollout),
         escape(&about),
         escape(&command),
-        escape(&format!("{name}{}{about}", if name.is_empty() { "" } else { ": " })),
+        escape(&format!(
+            "{name}{}{about}",
+            if name.is_empty() { "" } else { ": " }
+        )),
         escape(&about),
         if first { " data-first" } else { "" }
     )
@@ -51,7 +54,11 @@ pub(super) fn button(
 /// Describes a robot in a line.
 fn about(dossier: &Dossier, robot: &Robot) -> String {
     let counts = robot.voxels;
-    let verdict = dossier.findings.audit.as_ref().and_then(|audit| audit.robot(&robot.id));
+    let verdict = dossier
+        .findings
+        .audit
+        .as_ref()
+        .and_then(|audit| audit.robot(&robot.id));
     let verdict = verdict.map_or(String::new(), |found| format!("; {}", found.conclusion()));
     let born = match dossier.run.origin {
         Some(_) => String::new(),
@@ -75,14 +82,22 @@ pub(super) fn bodies(run: usize, dossier: &Dossier, rollouts: &Rollouts, spell: 
     let mut seen = BTreeSet::new();
     // A training has one robot, and no map that would play it.
     let is_first = dossier.run.origin.is_some();
-    let chosen = fittest.into_iter().take(SHOWN).chain(dossier.most_different(SHOWN + 1));
+    let chosen = fittest
+        .into_iter()
+        .take(SHOWN)
+        .chain(dossier.most_different(SHOWN + 1));
     let buttons: String = chosen
         .filter(|robot| seen.insert(robot.id.clone()))
         .map(|robot| {
             let id = escape(&robot.id);
             // The walks of a training had raised starts and so on; the page plays others.
             let walks: Vec<String> = match dossier.run.follows_protocol() {
-                true => robot.displacements.iter().take(4).map(|d| number::signed(*d, 1)).collect(),
+                true => robot
+                    .displacements
+                    .iter()
+                    .take(4)
+                    .map(|d| number::signed(*d, 1))
+                    .collect(),
                 false => vec![format!("fitness {}", number::fixed(robot.objective, 2))],
             };
             let content = format!(
@@ -91,7 +106,14 @@ pub(super) fn bodies(run: usize, dossier: &Dossier, rollouts: &Rollouts, spell: 
                 escape(&robot.task),
                 walks.join(" ")
             );
-            button(run, (dossier, spell), rollouts, robot, ("", "", is_first), &content)
+            button(
+                run,
+                (dossier, spell),
+                rollouts,
+                robot,
+                ("", "", is_first),
+                &content,
+            )
         })
         .collect();
     format!("<div class=\"bodies\">{buttons}</div>\n")
@@ -100,16 +122,28 @@ pub(super) fn bodies(run: usize, dossier: &Dossier, rollouts: &Rollouts, spell: 
 /// Draws a body's voxels by material.
 fn picture(body: &Body) -> String {
     let (height, width) = (body.voxels().height(), body.voxels().width());
-    let mut out =
-        format!("<svg viewBox=\"0 0 {width} {height}\" aria-hidden=\"true\" shape-rendering=\"crispEdges\">");
-    for material in Material::ALL.into_iter().filter(|material| *material != Material::Empty) {
+    let mut out = format!(
+        "<svg viewBox=\"0 0 {width} {height}\" aria-hidden=\"true\" shape-rendering=\"crispEdges\">"
+    );
+    for material in Material::ALL
+        .into_iter()
+        .filter(|material| *material != Material::Empty)
+    {
         let mut path = String::new();
-        for ((row, column), _) in body.voxels().iter().filter(|(_, found)| **found == material) {
+        for ((row, column), _) in body
+            .voxels()
+            .iter()
+            .filter(|(_, found)| **found == material)
+        {
             // Writing text to memory cannot fail.
             let _ = write!(path, "M{column} {row}h1v1h-1z");
         }
         if !path.is_empty() {
-            let _ = write!(out, "<path fill=\"{}\" d=\"{path}\"/>", robot::plain(material).hex());
+            let _ = write!(
+                out,
+                "<path fill=\"{}\" d=\"{path}\"/>",
+                robot::plain(material).hex()
+            );
             out += &marks(body, material);
         }
     }
@@ -119,7 +153,11 @@ fn picture(body: &Body) -> String {
 /// Returns the marks on a body's voxels of a material, as one path.
 fn marks(body: &Body, material: Material) -> String {
     let mut data = String::new();
-    for ((row, column), _) in body.voxels().iter().filter(|(_, found)| **found == material) {
+    for ((row, column), _) in body
+        .voxels()
+        .iter()
+        .filter(|(_, found)| **found == material)
+    {
         let (x, y) = (column as f64, row as f64);
         let corners = [[x, y], [x + 1.0, y], [x + 1.0, y + 1.0], [x, y + 1.0]];
         for line in mark(material) {

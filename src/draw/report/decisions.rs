@@ -19,19 +19,54 @@ pub(crate) fn table(file: &TeamFile) -> Option<(Vec<String>, Vec<Vec<String>>)> 
         let [accuracy, interval] = figures(accuracy);
         vec![name.to_string(), accuracy, interval]
     };
-    let of_decoder = |decoded: &Decoded| decoded.per_class.values().map(|share| percent(*share)).collect();
+    let of_decoder = |decoded: &Decoded| {
+        decoded
+            .per_class
+            .values()
+            .map(|share| percent(*share))
+            .collect()
+    };
     let none = || vec![String::new(); file.classes.len()];
     let rows: [(Vec<String>, Vec<String>); 6] = [
-        (row("team, most votes", &answers.votes.accuracy), of_decoder(&answers.votes)),
-        (row("team, sum of walks", &answers.walks.accuracy), of_decoder(&answers.walks)),
-        (row("linear, pairs with votes", &baselines.linear_pairs), none()),
-        (row("linear, one against rest", &baselines.linear_one_against_rest), none()),
-        (row("nearest neighbour", &baselines.nearest_neighbour), none()),
-        (row(&format!("best body ({})", baselines.best_body_id), &baselines.best_body), none()),
+        (
+            row("team, most votes", &answers.votes.accuracy),
+            of_decoder(&answers.votes),
+        ),
+        (
+            row("team, sum of walks", &answers.walks.accuracy),
+            of_decoder(&answers.walks),
+        ),
+        (
+            row("linear, pairs with votes", &baselines.linear_pairs),
+            none(),
+        ),
+        (
+            row(
+                "linear, one against rest",
+                &baselines.linear_one_against_rest,
+            ),
+            none(),
+        ),
+        (
+            row("nearest neighbour", &baselines.nearest_neighbour),
+            none(),
+        ),
+        (
+            row(
+                &format!("best body ({})", baselines.best_body_id),
+                &baselines.best_body,
+            ),
+            none(),
+        ),
     ];
-    let mut headers = ["answers", "accuracy %", "95 % interval"].map(str::to_string).to_vec();
+    let mut headers = ["answers", "accuracy %", "95 % interval"]
+        .map(str::to_string)
+        .to_vec();
     headers.extend(file.classes.iter().map(|class| format!("% of {class}")));
-    Some((headers, rows.map(|(row, classes)| [row, classes].concat()).to_vec()))
+    Some((
+        headers,
+        rows.map(|(row, classes)| [row, classes].concat()).to_vec(),
+    ))
 }
 
 /// Returns remarks on these answers, in lines.
@@ -41,7 +76,10 @@ pub(crate) fn remarks(file: &TeamFile) -> Vec<String> {
     };
     let (images, robots) = (file.images.len(), file.members.len());
     let mut lines = vec![
-        format!("{images} {} {} images, {robots} robots, no trained weights", file.dataset, file.split),
+        format!(
+            "{images} {} {} images, {robots} robots, no trained weights",
+            file.dataset, file.split
+        ),
         format!(
             "most votes: {} % of the images had a tie; on average {} % of the robots that know the answer voted \
              for it, {} of {robots} did not move",
@@ -63,5 +101,8 @@ pub(crate) fn remarks(file: &TeamFile) -> Vec<String> {
 /// Formats accuracy and interval \[%\].
 pub(crate) fn figures(accuracy: &Accuracy) -> [String; 2] {
     let [low, high] = accuracy.interval;
-    [percent(accuracy.accuracy), format!("{}–{}", percent(low), percent(high))]
+    [
+        percent(accuracy.accuracy),
+        format!("{}–{}", percent(low), percent(high)),
+    ]
 }

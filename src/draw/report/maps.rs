@@ -45,11 +45,17 @@ impl Rollouts {
             .iter()
             .enumerate()
             .flat_map(|(number, dossier)| {
-                played(dossier, most).into_iter().map(move |robot| (number, dossier, robot))
+                played(dossier, most)
+                    .into_iter()
+                    .map(move |robot| (number, dossier, robot))
             })
             .collect();
         // A team's walks need room, too.
-        let most_bytes = if gathered.team.is_some() { MOST_BYTES / 2 } else { MOST_BYTES };
+        let most_bytes = if gathered.team.is_some() {
+            MOST_BYTES / 2
+        } else {
+            MOST_BYTES
+        };
         let each = (most_bytes / jobs.len().max(1)).min(MOST_OF_ONE);
         let one = |&(number, dossier, robot): &(usize, &Dossier, &Robot)| {
             let recording = dossier.record(robot);
@@ -57,18 +63,28 @@ impl Rollouts {
             simulated();
             Ok(((number, robot.id.clone()), rollout))
         };
-        in_pool(|| jobs.par_iter().map(one).collect::<Result<BTreeMap<_, _>, _>>())?.map(Rollouts)
+        in_pool(|| {
+            jobs.par_iter()
+                .map(one)
+                .collect::<Result<BTreeMap<_, _>, _>>()
+        })?
+        .map(Rollouts)
     }
 
     /// Returns the id of the element with a robot's rollout.
     pub(crate) fn id(&self, run: usize, robot: &str) -> Option<String> {
-        self.0.contains_key(&(run, robot.to_string())).then(|| format!("rollout-{run}-{robot}"))
+        self.0
+            .contains_key(&(run, robot.to_string()))
+            .then(|| format!("rollout-{run}-{robot}"))
     }
 
     /// Returns the elements that hold the rollouts.
     pub(crate) fn elements(&self) -> String {
         let element = |((run, robot), rollout): (&(usize, String), &String)| {
-            format!("<script type=\"text/plain\" id=\"rollout-{run}-{}\">{rollout}</script>\n", escape(robot))
+            format!(
+                "<script type=\"text/plain\" id=\"rollout-{run}-{}\">{rollout}</script>\n",
+                escape(robot)
+            )
         };
         self.0.iter().map(element).collect()
     }
@@ -77,26 +93,48 @@ impl Rollouts {
 /// Describes the counts in a bin.
 fn range(bin: usize, area: usize) -> String {
     let width = (area / COUNT_BINS).max(1);
-    let last = if bin + 1 == COUNT_BINS { area } else { ((bin + 1) * width - 1).min(area) };
+    let last = if bin + 1 == COUNT_BINS {
+        area
+    } else {
+        ((bin + 1) * width - 1).min(area)
+    };
     format!("{}–{last}", bin * width)
 }
 
 /// Returns the map with its player.
-pub(super) fn archive(number: usize, dossier: &Dossier, rollouts: &Rollouts, spell: Spell) -> String {
+pub(super) fn archive(
+    number: usize,
+    dossier: &Dossier,
+    rollouts: &Rollouts,
+    spell: Spell,
+) -> String {
     let run = &dossier.run;
     let tasks = &run.dimensions.tasks;
     let area = run.config.body.height * run.config.body.width;
     let space = DescriptorSpace::voxel_counts(tasks.len());
-    let possible: BTreeSet<Vec<usize>> = possible_cells(area, run.config.body.min_muscles, tasks.len())
-        .into_iter()
-        .filter_map(|index| space.coordinates(index))
+    let possible: BTreeSet<Vec<usize>> =
+        possible_cells(area, run.config.body.min_muscles, tasks.len())
+            .into_iter()
+            .filter_map(|index| space.coordinates(index))
+            .collect();
+    let elites: BTreeMap<&[usize], &Robot> = run
+        .elites
+        .iter()
+        .map(|robot| (robot.cell.as_slice(), robot))
         .collect();
-    let elites: BTreeMap<&[usize], &Robot> =
-        run.elites.iter().map(|robot| (robot.cell.as_slice(), robot)).collect();
-    let highest = run.elites.iter().map(|robot| robot.objective).fold(0.0, f64::max);
+    let highest = run
+        .elites
+        .iter()
+        .map(|robot| robot.objective)
+        .fold(0.0, f64::max);
     let colour = |objective: f64| match objective < 0.0 {
         true => below(0.7).hex(),
-        false => sequential(if highest > 0.0 { objective / highest } else { 0.0 }).hex(),
+        false => sequential(if highest > 0.0 {
+            objective / highest
+        } else {
+            0.0
+        })
+        .hex(),
     };
     let mut out =
         "<p>A square is a cell of the archive: how many muscle voxels (right) and sensor voxels (up) a \
@@ -111,7 +149,9 @@ pub(super) fn archive(number: usize, dossier: &Dossier, rollouts: &Rollouts, spe
             .collect();
         out += &format!("<p><label>Task <select class=\"task\">{options}</select></label></p>\n");
     }
-    let stops: Vec<String> = (0..=8).map(|k| sequential(f64::from(k) / 8.0).hex()).collect();
+    let stops: Vec<String> = (0..=8)
+        .map(|k| sequential(f64::from(k) / 8.0).hex())
+        .collect();
     out += &format!(
         "<div class=\"scale\">fitness 0 <i style=\"background:linear-gradient(90deg,{})\"></i> {}; gray: below \
          0</div>\n",
@@ -128,7 +168,11 @@ pub(super) fn archive(number: usize, dossier: &Dossier, rollouts: &Rollouts, spe
         for total in 0..COUNT_BINS {
             let mut cells = String::new();
             // Leaves out rows in which no body is possible.
-            let highest = possible.iter().filter(|cell| cell[2] == total).map(|cell| cell[1]).max();
+            let highest = possible
+                .iter()
+                .filter(|cell| cell[2] == total)
+                .map(|cell| cell[1])
+                .max();
             let Some(highest) = highest else { continue };
             for sensor in (0..=highest).rev() {
                 for muscle in 0..COUNT_BINS {
@@ -144,10 +188,19 @@ pub(super) fn archive(number: usize, dossier: &Dossier, rollouts: &Rollouts, spe
                         Some(robot) => {
                             let style = format!("background:{}", colour(robot.objective));
                             let first = best.as_ref() == Some(&robot.id);
-                            button(number, (dossier, spell), rollouts, robot, (&style, &name, first), "")
+                            button(
+                                number,
+                                (dossier, spell),
+                                rollouts,
+                                robot,
+                                (&style, &name, first),
+                                "",
+                            )
                         }
                         None if possible.contains(&cell) => {
-                            format!("<span class=\"empty\" role=\"img\" aria-label=\"{name}: empty\"></span>")
+                            format!(
+                                "<span class=\"empty\" role=\"img\" aria-label=\"{name}: empty\"></span>"
+                            )
                         }
                         None => "<span></span>".to_string(),
                     };
@@ -164,6 +217,14 @@ pub(super) fn archive(number: usize, dossier: &Dossier, rollouts: &Rollouts, spe
 }
 
 /// Returns the robots of a training with their player.
-pub(super) fn robots(number: usize, dossier: &Dossier, rollouts: &Rollouts, spell: Spell) -> String {
-    format!("<div class=\"archive\">\n{}{PLAYER}</div>\n", bodies(number, dossier, rollouts, spell))
+pub(super) fn robots(
+    number: usize,
+    dossier: &Dossier,
+    rollouts: &Rollouts,
+    spell: Spell,
+) -> String {
+    format!(
+        "<div class=\"archive\">\n{}{PLAYER}</div>\n",
+        bodies(number, dossier, rollouts, spell)
+    )
 }

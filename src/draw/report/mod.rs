@@ -17,8 +17,11 @@ use crate::draw::{html, plot};
 use bodies::Rollouts;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-const SCRIPT: &str =
-    concat!(include_str!("../drawing.js"), include_str!("../stages.js"), include_str!("report.js"));
+const SCRIPT: &str = concat!(
+    include_str!("../drawing.js"),
+    include_str!("../stages.js"),
+    include_str!("report.js")
+);
 
 /// Spells a command as its users type it.
 pub(crate) type Spell<'a> = &'a dyn Fn(&Invocation) -> String;
@@ -37,8 +40,12 @@ pub(crate) struct Content<'a> {
 impl Content<'_> {
     /// Returns the number of rollouts to simulate for the page.
     pub(crate) fn count(&self) -> usize {
-        let of_runs: usize =
-            self.gathered.runs.iter().map(|dossier| maps::played(dossier, self.rollouts).len()).sum();
+        let of_runs: usize = self
+            .gathered
+            .runs
+            .iter()
+            .map(|dossier| maps::played(dossier, self.rollouts).len())
+            .sum();
         of_runs + self.gathered.team.as_ref().map_or(0, team::count)
     }
 
@@ -47,7 +54,11 @@ impl Content<'_> {
     /// # Errors
     /// Returns an error if a rollout cannot be drawn.
     pub(crate) fn page(&self, simulated: &(dyn Fn(u64) + Sync)) -> Result<String, PictureError> {
-        let Gathered { runs, together, team } = self.gathered;
+        let Gathered {
+            runs,
+            together,
+            team,
+        } = self.gathered;
         let done = AtomicU64::new(0);
         let simulated = || simulated(done.fetch_add(1, Ordering::Relaxed) + 1);
         let rollouts = Rollouts::record(self.gathered, self.rollouts, &simulated)?;
@@ -62,10 +73,15 @@ impl Content<'_> {
             content += &run(number, dossier, &rollouts, runs.len() > 1, self.spell);
         }
         content += &rollouts.elements();
-        let style =
-            [include_str!("../replay.css"), include_str!("../stages.css"), include_str!("report.css")]
-                .concat();
-        let player = serde_json::Value::from(html::player("%ROLLOUT%")).to_string().replace('<', "\\u003c");
+        let style = [
+            include_str!("../replay.css"),
+            include_str!("../stages.css"),
+            include_str!("report.css"),
+        ]
+        .concat();
+        let player = serde_json::Value::from(html::player("%ROLLOUT%"))
+            .to_string()
+            .replace('<', "\\u003c");
         Ok(fill(
             include_str!("report.html"),
             &[
@@ -81,17 +97,30 @@ impl Content<'_> {
 
 /// Embeds a figure in the page, in a column's or a page's width.
 fn figure(figure: &Figure, class: &str) -> String {
-    format!("<figure class=\"figure {class}\">{}</figure>\n", figure.svg())
+    format!(
+        "<figure class=\"figure {class}\">{}</figure>\n",
+        figure.svg()
+    )
 }
 
 /// Summarises several runs together.
 fn overview(runs: &[Dossier], together: &Findings) -> String {
     let mut out = "<section id=\"together\">\n<h2>All runs together</h2>\n".to_string();
     let are_trained = runs.iter().all(|dossier| dossier.run.origin.is_some());
-    out += &if are_trained { tables::trainings(runs) } else { tables::runs(runs) };
-    let progress: Option<Vec<_>> = runs.iter().map(|dossier| dossier.progress.clone()).collect();
+    out += &if are_trained {
+        tables::trainings(runs)
+    } else {
+        tables::runs(runs)
+    };
+    let progress: Option<Vec<_>> = runs
+        .iter()
+        .map(|dossier| dossier.progress.clone())
+        .collect();
     if let Some(progress) = progress.filter(|_| !are_trained) {
-        out += &format!("<div class=\"figures\">{}</div>\n", figure(&plot::progress(&progress), "column"));
+        out += &format!(
+            "<div class=\"figures\">{}</div>\n",
+            figure(&plot::progress(&progress), "column")
+        );
     }
     out += &findings(together);
     out + "</section>\n"
@@ -104,9 +133,16 @@ fn run(
     is_one_of_several: bool,
     spell: Spell,
 ) -> String {
-    let name = if is_one_of_several { format!("{}: ", words::name(dossier)) } else { String::new() };
+    let name = if is_one_of_several {
+        format!("{}: ", words::name(dossier))
+    } else {
+        String::new()
+    };
     let heading = |what: &str| format!("<h2>{}{what}</h2>\n", escape(&name));
-    let mut out = format!("<section id=\"run{number}\" data-run=\"{number}\">\n{}", heading("What was run"));
+    let mut out = format!(
+        "<section id=\"run{number}\" data-run=\"{number}\">\n{}",
+        heading("What was run")
+    );
     out += &tables::about(dossier);
     if dossier.run.origin.is_some() {
         // A training has one robot, and no archive with a history.
@@ -124,8 +160,14 @@ fn run(
             figures += &figure(&plot::progress(std::slice::from_ref(progress)), "column");
         }
         let tasks = dossier.run.dimensions.tasks.len();
-        figures += &figure(&plot::archive(&dossier.run), if tasks > 1 { "page" } else { "column" });
-        out += &format!("{}<div class=\"figures\">\n{figures}</div>\n", heading("Progress"));
+        figures += &figure(
+            &plot::archive(&dossier.run),
+            if tasks > 1 { "page" } else { "column" },
+        );
+        out += &format!(
+            "{}<div class=\"figures\">\n{figures}</div>\n",
+            heading("Progress")
+        );
     }
     out += &findings(&dossier.findings);
     out += &heading("Methods");
@@ -138,19 +180,33 @@ fn run(
 /// Summarises the test results.
 fn findings(found: &Findings) -> String {
     let mut out = String::new();
-    if let Some(report) = found.eval.as_ref().filter(|report| !report.robots.is_empty()) {
+    if let Some(report) = found
+        .eval
+        .as_ref()
+        .filter(|report| !report.robots.is_empty())
+    {
         out += "<h2>Test on held-out images</h2>\n";
         out += &tables::eval(report);
-        out += &format!("<div class=\"figures\">{}</div>\n", figure(&plot::accuracy(report), "column"));
+        out += &format!(
+            "<div class=\"figures\">{}</div>\n",
+            figure(&plot::accuracy(report), "column")
+        );
     }
     if let Some(audit) = &found.audit {
         out += "<h2>Audit</h2>\n";
         out += &tables::audit(audit);
     }
-    if let Some(file) = found.capacity.as_ref().filter(|file| !file.tasks.is_empty()) {
+    if let Some(file) = found
+        .capacity
+        .as_ref()
+        .filter(|file| !file.tasks.is_empty())
+    {
         out += "<h2>Capacity</h2>\n";
         out += &tables::capacity(file);
-        out += &format!("<div class=\"figures\">{}</div>\n", figure(&plot::capacity(file), "page"));
+        out += &format!(
+            "<div class=\"figures\">{}</div>\n",
+            figure(&plot::capacity(file), "page")
+        );
     }
     out
 }

@@ -51,13 +51,23 @@ pub(super) fn runs(runs: &[Dossier]) -> String {
         vec![
             words::name(dossier),
             dossier.run.generations.to_string(),
-            format!("{} of {}", stats.num_elites, dossier.run.dimensions.possible_cells),
+            format!(
+                "{} of {}",
+                stats.num_elites, dossier.run.dimensions.possible_cells
+            ),
             number::fixed(stats.qd_score, 1),
             or_none(stats.obj_max, |best| number::fixed(best, 2)),
             or_none(dossier.effort(), |(seconds, _)| duration(seconds)),
         ]
     };
-    let headers = ["run", "generations", "cells filled", "QD score", "best fitness", "time"];
+    let headers = [
+        "run",
+        "generations",
+        "cells filled",
+        "QD score",
+        "best fitness",
+        "time",
+    ];
     table(&headers, runs.iter().map(row))
 }
 
@@ -68,7 +78,10 @@ pub(super) fn trainings(runs: &[Dossier]) -> String {
         let Findings { eval, audit, .. } = &dossier.findings;
         let robot = run.elites.first();
         let tested = robot.and_then(|robot| {
-            eval.as_ref()?.robots.iter().find(|tested| (&tested.id, &tested.task) == (&robot.id, &robot.task))
+            eval.as_ref()?
+                .robots
+                .iter()
+                .find(|tested| (&tested.id, &tested.task) == (&robot.id, &robot.task))
         });
         let audited = robot.and_then(|robot| audit.as_ref()?.robot(&robot.id));
         vec![
@@ -81,7 +94,15 @@ pub(super) fn trainings(runs: &[Dossier]) -> String {
             or_none(dossier.effort(), |(seconds, _)| duration(seconds)),
         ]
     };
-    let headers = ["training", "task", "fitness", "test, correct %", "balanced %", "audit", "time"];
+    let headers = [
+        "training",
+        "task",
+        "fitness",
+        "test, correct %",
+        "balanced %",
+        "audit",
+        "time",
+    ];
     table(&headers, runs.iter().map(row))
 }
 
@@ -96,7 +117,11 @@ pub(super) fn about(dossier: &Dossier) -> String {
         .map(|image| format!("{} (train {})", image.label, image.index))
         .collect();
     let more = run.training_images.len().saturating_sub(images.len());
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    let more = if more > 0 {
+        format!(" and {more} more")
+    } else {
+        String::new()
+    };
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let machine = format!(
         "{} {}, {cores} cores, {}",
@@ -105,7 +130,11 @@ pub(super) fn about(dossier: &Dossier) -> String {
         InstructionSet::in_use().name()
     );
     let effort = or_none(dossier.effort(), |(seconds, evaluations)| {
-        format!("{} evaluations in {}", number::fixed(evaluations, 0), duration(seconds))
+        format!(
+            "{} evaluations in {}",
+            number::fixed(evaluations, 0),
+            duration(seconds)
+        )
     });
     let time = or_none(dossier.effort(), |(seconds, _)| duration(seconds));
     let best = or_none(stats.obj_max, |best| run.in_units(best));
@@ -118,7 +147,12 @@ pub(super) fn about(dossier: &Dossier) -> String {
             };
             let age = counted(origin.generations, "generation", "generations");
             let gaits = format!("{} after {age}", origin.name);
-            vec![("Gaits", gaits), ("Window", window), ("Fitness", best), ("Time", time)]
+            vec![
+                ("Gaits", gaits),
+                ("Window", window),
+                ("Fitness", best),
+                ("Time", time),
+            ]
         }
         None => {
             let archive = format!(
@@ -129,20 +163,38 @@ pub(super) fn about(dossier: &Dossier) -> String {
                 number::fixed(stats.qd_score, 1),
             );
             let generations = format!("{} of {}", run.generations, run.config.generations);
-            vec![("Generations", generations), ("Effort", effort), ("Archive", archive)]
+            vec![
+                ("Generations", generations),
+                ("Effort", effort),
+                ("Archive", archive),
+            ]
         }
     };
     let mut rows = vec![
         ("Run", words::name(dossier)),
         ("Tasks", run.dimensions.tasks.join(", ")),
-        ("Data", format!("{}, training split SHA-256 {}", run.dataset.name, run.dataset.train_sha256)),
+        (
+            "Data",
+            format!(
+                "{}, training split SHA-256 {}",
+                run.dataset.name, run.dataset.train_sha256
+            ),
+        ),
         ("Training images", format!("{}{more}", images.join(", "))),
     ];
     rows.extend(came_about);
-    rows.extend([("Made with", format!("morphcog {}", run.program_version)), ("Report made on", machine)]);
+    rows.extend([
+        ("Made with", format!("morphcog {}", run.program_version)),
+        ("Report made on", machine),
+    ]);
     let rows: String = rows
         .into_iter()
-        .map(|(key, value)| format!("<tr><th scope=\"row\">{key}</th><td>{}</td></tr>\n", escape(&value)))
+        .map(|(key, value)| {
+            format!(
+                "<tr><th scope=\"row\">{key}</th><td>{}</td></tr>\n",
+                escape(&value)
+            )
+        })
         .collect();
     format!(
         "<div class=\"card\"><table><tbody>\n{rows}</tbody></table></div>\n\
@@ -169,14 +221,20 @@ pub(super) fn eval(report: &EvalFile) -> String {
             mean.robots.to_string(),
             percent(mean.accuracy),
             or_none(mean.standard_deviation, percent),
-            or_none(mean.interval, |[low, high]| format!("{}–{}", percent(low), percent(high))),
-            or_none(published::row(&report.dataset, task).filter(|_| as_published), |row| {
-                number::fixed(row.accuracy, 1)
+            or_none(mean.interval, |[low, high]| {
+                format!("{}–{}", percent(low), percent(high))
             }),
+            or_none(
+                published::row(&report.dataset, task).filter(|_| as_published),
+                |row| number::fixed(row.accuracy, 1),
+            ),
             percent(mean.balanced_accuracy),
             or_none(known, |known| percent(known.larger_group)),
             or_none(known, |known| percent(known.best_single_pixel)),
-            or_none(known.and_then(|known| known.nearest_training_image), percent),
+            or_none(
+                known.and_then(|known| known.nearest_training_image),
+                percent,
+            ),
         ]
     };
     let headers = [
@@ -195,7 +253,9 @@ pub(super) fn eval(report: &EvalFile) -> String {
     let row = |robot: &RobotReport| {
         let mut row = of_robot(robot);
         row.push(percent(robot.not_moved));
-        row.push(or_none(robot.validation.as_ref(), |found| percent(found.balanced_accuracy)));
+        row.push(or_none(robot.validation.as_ref(), |found| {
+            percent(found.balanced_accuracy)
+        }));
         row
     };
     let headers = [
@@ -217,14 +277,27 @@ pub(super) fn eval(report: &EvalFile) -> String {
 /// Notes how many entries are not listed, and which file has them.
 fn more(count: usize, file: &str) -> String {
     let more = count.saturating_sub(LISTED);
-    if more > 0 { format!("<p>And {more} more, in <code>{file}</code>.</p>\n") } else { String::new() }
+    if more > 0 {
+        format!("<p>And {more} more, in <code>{file}</code>.</p>\n")
+    } else {
+        String::new()
+    }
 }
 
 pub(super) fn audit(audit: &AuditFile) -> String {
-    let verdicts = [Verdict::Physical, Verdict::Exploits, Verdict::Fragile, Verdict::NotAWalker];
+    let verdicts = [
+        Verdict::Physical,
+        Verdict::Exploits,
+        Verdict::Fragile,
+        Verdict::NotAWalker,
+    ];
     let counts: Vec<String> = verdicts
         .map(|verdict| {
-            let count = audit.robots.iter().filter(|robot| robot.verdict == verdict).count();
+            let count = audit
+                .robots
+                .iter()
+                .filter(|robot| robot.verdict == verdict)
+                .count();
             format!("{count} {}", verdict.name())
         })
         .to_vec();
@@ -234,8 +307,11 @@ pub(super) fn audit(audit: &AuditFile) -> String {
         audit.robots.len(),
         counts.join(", ")
     );
-    let mut walkers: Vec<_> =
-        audit.robots.iter().filter(|robot| robot.verdict != Verdict::NotAWalker).collect();
+    let mut walkers: Vec<_> = audit
+        .robots
+        .iter()
+        .filter(|robot| robot.verdict != Verdict::NotAWalker)
+        .collect();
     walkers.sort_by(|a, b| b.persisting.total_cmp(&a.persisting));
     let row = |robot: &&crate::store::audit::RobotAudit| {
         vec![
@@ -247,7 +323,13 @@ pub(super) fn audit(audit: &AuditFile) -> String {
         ]
     };
     let rows: Vec<Vec<String>> = walkers.iter().take(LISTED).map(row).collect();
-    let headers = ["robot", "task", "verdict", "persists in % of changed rollouts", "spread"];
+    let headers = [
+        "robot",
+        "task",
+        "verdict",
+        "persists in % of changed rollouts",
+        "spread",
+    ];
     let listed = table(&headers, rows) + &more(walkers.len(), "audit.csv");
     out += &format!("<details><summary>Verdicts on the walkers</summary>\n{listed}</details>\n");
     out
@@ -268,14 +350,26 @@ pub(super) fn capacity(file: &CapacityFile) -> String {
             or_none(paper, |row| size(row.cnn.map(Crossing::At))),
         ]
     });
-    let headers =
-        ["task", "robots", "accuracy %", "paper's %", "MLP neurons", "paper's", "CNN kernels", "paper's"];
+    let headers = [
+        "task",
+        "robots",
+        "accuracy %",
+        "paper's %",
+        "MLP neurons",
+        "paper's",
+        "CNN kernels",
+        "paper's",
+    ];
     let waits = if file.patience_on == "test" {
         "the test images, as in the paper"
     } else {
         "images of the training split"
     };
-    let physical = if file.physical_only { " that are physical" } else { "" };
+    let physical = if file.physical_only {
+        " that are physical"
+    } else {
+        ""
+    };
     format!(
         "<p>Of the robots{physical}: networks trained on their images, {} times per size; early stopping waits on \
          {waits}.</p>\n{}",

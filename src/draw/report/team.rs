@@ -57,9 +57,15 @@ pub(super) fn section(
     if count(team) > 0 {
         out += &watched(team, runs, simulated)?;
     }
-    let figures = [plot::confusion(file), plot::poster(file)].into_iter().flatten();
+    let figures = [plot::confusion(file), plot::poster(file)]
+        .into_iter()
+        .flatten();
     let class = |figure: &Figure| {
-        if figure.size()[0] > COLUMN + 1.0 { "page" } else { "column" }
+        if figure.size()[0] > COLUMN + 1.0 {
+            "page"
+        } else {
+            "column"
+        }
     };
     let figures: String = figures.map(|found| figure(&found, class(&found))).collect();
     out += &format!("<div class=\"figures\">\n{figures}</div>\n");
@@ -67,11 +73,16 @@ pub(super) fn section(
 }
 
 /// Returns the buttons, the stages and the walks.
-fn watched(team: &Team, runs: &[Dossier], simulated: &(dyn Fn() + Sync)) -> Result<String, PictureError> {
+fn watched(
+    team: &Team,
+    runs: &[Dossier],
+    simulated: &(dyn Fn() + Sync),
+) -> Result<String, PictureError> {
     let shown = shown(team, runs);
     let members = team.file.members.len();
-    let jobs: Vec<(usize, usize)> =
-        (0..team.images.len()).flat_map(|image| (0..members).map(move |member| (image, member))).collect();
+    let jobs: Vec<(usize, usize)> = (0..team.images.len())
+        .flat_map(|image| (0..members).map(move |member| (image, member)))
+        .collect();
     let walk = |(image, member): &(usize, usize)| {
         let walk = PackedWalk::new(&team.record(runs, *member, *image), &shown);
         simulated();
@@ -79,8 +90,11 @@ fn watched(team: &Team, runs: &[Dossier], simulated: &(dyn Fn() + Sync)) -> Resu
     };
     let walks: Vec<PackedWalk> = in_pool(|| jobs.par_iter().map(walk).collect())?;
     // In a script element, only "<" can end it or open another.
-    let robots = robots(team, &walks, &shown).to_string().replace('<', "\\u003c");
-    let mut elements = format!("<script type=\"application/json\" id=\"team-robots\">{robots}</script>\n");
+    let robots = robots(team, &walks, &shown)
+        .to_string()
+        .replace('<', "\\u003c");
+    let mut elements =
+        format!("<script type=\"application/json\" id=\"team-robots\">{robots}</script>\n");
     let mut buttons = String::new();
     for (number, walks) in walks.chunks(members).enumerate() {
         elements += &format!(
@@ -106,10 +120,14 @@ fn shown(team: &Team, runs: &[Dossier]) -> Vec<usize> {
     let Team { file, runs: of, .. } = team;
     let points = |member: &Member| (member.body.height() + 1) * (member.body.width() + 1);
     let points = file.members.iter().map(points).max().unwrap_or(0);
-    let steps = of.iter().map(|run| control_steps(&runs[*run].run.config, file.cycles) as usize);
+    let steps = of
+        .iter()
+        .map(|run| control_steps(&runs[*run].run.config, file.cycles) as usize);
     let steps = steps.max().unwrap_or(0);
     // Two bytes for a point.
-    let apart = (steps * 2 * points * count(team)).div_ceil(MOST_BYTES).max(LEAST_APART);
+    let apart = (steps * 2 * points * count(team))
+        .div_ceil(MOST_BYTES)
+        .max(LEAST_APART);
     (0..steps).step_by(apart).chain([steps]).collect()
 }
 
@@ -147,7 +165,11 @@ fn under_image(team: &Team, number: usize, walks: &[PackedWalk]) -> Value {
 
 /// Returns the team's answer to one of the images to watch it by.
 fn answer(team: &Team, number: usize) -> u8 {
-    let answers = team.file.answers.as_ref().expect("a team that has not answered is left out");
+    let answers = team
+        .file
+        .answers
+        .as_ref()
+        .expect("a team that has not answered is left out");
     answers.votes.answers[team.images[number]]
 }
 
@@ -155,7 +177,12 @@ fn answer(team: &Team, number: usize) -> u8 {
 fn button(team: &Team, number: usize) -> String {
     let image = team.file.images[team.images[number]];
     let answer = answer(team, number);
-    let label = format!("class {}, {} {}: says {answer}", image.label, team.file.split.split(), image.index);
+    let label = format!(
+        "class {}, {} {}: says {answer}",
+        image.label,
+        team.file.split.split(),
+        image.index
+    );
     format!(
         "<button type=\"button\" data-walks=\"team-{number}\" data-right=\"{}\" aria-pressed=\"false\" \
          aria-label=\"{label}\" title=\"{label}\">{}<small>says {answer}</small></button>",
@@ -187,7 +214,10 @@ impl PackedWalk {
             voxels: recording.voxels.clone(),
             points: first.points.len(),
             begin,
-            moved: shown.iter().map(|step| there(step).map(|frame| frame.centre[0] - begin)).collect(),
+            moved: shown
+                .iter()
+                .map(|step| there(step).map(|frame| frame.centre[0] - begin))
+                .collect(),
             positions: BASE64.encode(positions(&frames)),
         }
     }
@@ -202,17 +232,26 @@ fn is_finite(frame: &Frame) -> bool {
 /// than four voxel lengths per moment lag behind.
 fn positions(frames: &[&Frame]) -> Vec<u8> {
     let steps = |frame: &Frame| -> Vec<i32> {
-        frame.points.iter().flatten().map(|v| (v * STEPS).round() as i32).collect()
+        frame
+            .points
+            .iter()
+            .flatten()
+            .map(|v| (v * STEPS).round() as i32)
+            .collect()
     };
     let Some((first, others)) = frames.split_first() else {
         return Vec::new();
     };
-    let mut at: Vec<i32> =
-        steps(first).into_iter().map(|v| v.clamp(i32::from(i16::MIN), i32::from(i16::MAX))).collect();
+    let mut at: Vec<i32> = steps(first)
+        .into_iter()
+        .map(|v| v.clamp(i32::from(i16::MIN), i32::from(i16::MAX)))
+        .collect();
     let mut bytes: Vec<u8> = at.iter().flat_map(|v| (*v as i16).to_le_bytes()).collect();
     for frame in others {
         for (at, to) in at.iter_mut().zip(steps(frame)) {
-            let step = to.saturating_sub(*at).clamp(i32::from(i8::MIN), i32::from(i8::MAX));
+            let step = to
+                .saturating_sub(*at)
+                .clamp(i32::from(i8::MIN), i32::from(i8::MAX));
             *at += step;
             bytes.push(step as i8 as u8);
         }
@@ -231,8 +270,10 @@ fn thumbnail(stimulus: &Grid<f64>) -> String {
         let grey = (255.0 * value.clamp(0.0, 1.0)).round() as u8;
         if grey > 0 {
             // Writing text to memory cannot fail.
-            let _ =
-                write!(out, "<path fill=\"#{grey:02x}{grey:02x}{grey:02x}\" d=\"M{column} {row}h1v1h-1z\"/>");
+            let _ = write!(
+                out,
+                "<path fill=\"#{grey:02x}{grey:02x}{grey:02x}\" d=\"M{column} {row}h1v1h-1z\"/>"
+            );
         }
     }
     out + "</svg>"
@@ -243,7 +284,10 @@ mod tests {
     use super::*;
 
     fn frame(points: &[[f64; 2]]) -> Frame {
-        Frame { points: points.to_vec(), centre: points[0] }
+        Frame {
+            points: points.to_vec(),
+            centre: points[0],
+        }
     }
 
     #[test]
@@ -255,18 +299,28 @@ mod tests {
         ];
         let bytes = positions(&frames.iter().collect::<Vec<_>>());
         assert_eq!(bytes.len(), 8 + 2 * 4);
-        let mut at: Vec<i32> =
-            bytes[..8].chunks(2).map(|b| i32::from(i16::from_le_bytes([b[0], b[1]]))).collect();
+        let mut at: Vec<i32> = bytes[..8]
+            .chunks(2)
+            .map(|b| i32::from(i16::from_le_bytes([b[0], b[1]])))
+            .collect();
         let near = |at: &[i32], frame: &Frame| {
             let points: Vec<f64> = frame.points.iter().flatten().copied().collect();
-            at.iter().zip(points).map(|(at, v)| (f64::from(*at) / STEPS - v).abs()).fold(0.0, f64::max)
+            at.iter()
+                .zip(points)
+                .map(|(at, v)| (f64::from(*at) / STEPS - v).abs())
+                .fold(0.0, f64::max)
         };
         assert!(near(&at, &frames[0]) <= 0.5 / STEPS);
         for (number, moment) in bytes[8..].chunks(4).enumerate() {
-            at.iter_mut().zip(moment).for_each(|(at, step)| *at += i32::from(*step as i8));
+            at.iter_mut()
+                .zip(moment)
+                .for_each(|(at, step)| *at += i32::from(*step as i8));
             // The second point jumps by 9.3 voxel lengths; in the third moment it is nearly there.
             let off = near(&at, &frames[number + 1]);
-            assert!(if number == 0 { off > 1.0 } else { off < 2.0 }, "{number}: {off}");
+            assert!(
+                if number == 0 { off > 1.0 } else { off < 2.0 },
+                "{number}: {off}"
+            );
         }
     }
 }

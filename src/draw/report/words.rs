@@ -33,7 +33,10 @@ use std::path::{Path, PathBuf};
 pub(super) fn name(dossier: &Dossier) -> String {
     let folder = dossier.path.parent().filter(|_| dossier.namesake.is_some());
     let folder = folder.map_or(String::new(), |folder| format!(" ({})", folder.display()));
-    format!("{}, seed {}{folder}", dossier.run.name, dossier.run.config.seed)
+    format!(
+        "{}, seed {}{folder}",
+        dossier.run.name, dossier.run.config.seed
+    )
 }
 
 pub(super) fn title(runs: &[Dossier]) -> String {
@@ -51,7 +54,10 @@ pub(super) fn contents(runs: &[Dossier]) -> String {
     let link = |(number, dossier): (usize, &Dossier)| {
         format!("<a href=\"#run{number}\">{}</a>\n", escape(&name(dossier)))
     };
-    format!("<nav aria-label=\"Runs\">\n{}</nav>\n", runs.iter().enumerate().map(link).collect::<String>())
+    format!(
+        "<nav aria-label=\"Runs\">\n{}</nav>\n",
+        runs.iter().enumerate().map(link).collect::<String>()
+    )
 }
 
 /// Describes what fitness rewards.
@@ -75,9 +81,9 @@ fn rewarded(fitness: Fitness) -> &'static str {
 /// Describes how the robots evolved.
 fn evolved(dossier: &Dossier) -> String {
     let run = &dossier.run;
-    let evaluations = dossier
-        .effort()
-        .map_or(String::new(), |(_, count)| format!(" ({} evaluations)", number::fixed(count, 0)));
+    let evaluations = dossier.effort().map_or(String::new(), |(_, count)| {
+        format!(" ({} evaluations)", number::fixed(count, 0))
+    });
     format!(
         "were encoded by compositional pattern-producing networks and evolved with MAP-Elites for {} \
          generations{evaluations}, seed {}, using morphcog {}. The archive's dimensions are the numbers of muscle, \
@@ -86,7 +92,11 @@ fn evolved(dossier: &Dossier) -> String {
         run.generations,
         run.config.seed,
         run.program_version,
-        if run.dimensions.tasks.len() > 1 { ", and the task performed" } else { "" },
+        if run.dimensions.tasks.len() > 1 {
+            ", and the task performed"
+        } else {
+            ""
+        },
         run.stats.num_elites,
         run.dimensions.possible_cells,
         run.config.map_elites.parents,
@@ -95,7 +105,14 @@ fn evolved(dossier: &Dossier) -> String {
 
 /// Describes how the robot was trained.
 fn trained(run: &RunFile, origin: &Origin) -> String {
-    let TrainConfig { random_images, rounds, images, final_images, challengers, .. } = run.config.train;
+    let TrainConfig {
+        random_images,
+        rounds,
+        images,
+        final_images,
+        challengers,
+        ..
+    } = run.config.train;
     let window = match origin.windows {
         0 => String::new(),
         windows => format!(" (and one of {windows} windows of the images)"),
@@ -117,11 +134,19 @@ fn trained(run: &RunFile, origin: &Origin) -> String {
 
 /// Describes the perturbations that alternate in a training.
 fn perturbed(run: &RunFile) -> String {
-    let ByTurns { start, length_limits } = run.config.train.perturbations;
+    let ByTurns {
+        start,
+        length_limits,
+    } = run.config.train.perturbations;
     let start = (start > 0).then(|| format!("from starts raised by up to {start} voxels"));
-    let limits = length_limits.then(|| "half of the time with length limits beyond all goals".to_string());
+    let limits =
+        length_limits.then(|| "half of the time with length limits beyond all goals".to_string());
     let both: Vec<String> = start.into_iter().chain(limits).collect();
-    if both.is_empty() { String::new() } else { format!(" ({})", both.join(", ")) }
+    if both.is_empty() {
+        String::new()
+    } else {
+        format!(" ({})", both.join(", "))
+    }
 }
 
 /// Returns a methods paragraph that could go into a paper.
@@ -129,18 +154,29 @@ pub(super) fn methods(dossier: &Dossier) -> String {
     let run = &dossier.run;
     let config = &run.config;
     let (height, width) = (config.body.height, config.body.width);
-    let made = run.origin.as_ref().map_or_else(|| evolved(dossier), |origin| trained(run, origin));
+    let made = run
+        .origin
+        .as_ref()
+        .map_or_else(|| evolved(dossier), |origin| trained(run, origin));
     let encoding = match config.stimulus.encoding {
         Encoding::Intensity => "proportional to the pixel's intensity".to_string(),
         Encoding::Saturated => "1 for any pixel above 0".to_string(),
-        Encoding::Threshold => format!("1 for any pixel above {} of full intensity", config.stimulus.level),
+        Encoding::Threshold => format!(
+            "1 for any pixel above {} of full intensity",
+            config.stimulus.level
+        ),
     };
     let margin = match config.stimulus.margin {
         none if none.is_none() => String::new(),
         margin if margin == Margins::same(margin.top) => {
             format!(" (without a margin of {margin} pixels)")
         }
-        Margins { top, right, bottom, left } => format!(
+        Margins {
+            top,
+            right,
+            bottom,
+            left,
+        } => format!(
             " (without its {top} rows of pixels at the top, {bottom} at the bottom, {left} columns on the left and {right} on the right)"
         ),
     };
@@ -150,11 +186,27 @@ pub(super) fn methods(dossier: &Dossier) -> String {
         RolloutMode::Fresh => "a rollout of its own from the initial state",
         RolloutMode::Sequential => "one continuous rollout for all images",
     };
-    let counts = |label: u8| run.training_images.iter().filter(|image| image.label == label).count();
-    let images: Vec<String> =
-        config.classes().into_iter().map(|class| format!("{} of class {class}", counts(class))).collect();
-    let shown = if run.origin.is_some() { "The fitness is that on" } else { "Robots were trained on" };
-    let conditions = if run.origin.is_some() { perturbed(run) } else { String::new() };
+    let counts = |label: u8| {
+        run.training_images
+            .iter()
+            .filter(|image| image.label == label)
+            .count()
+    };
+    let images: Vec<String> = config
+        .classes()
+        .into_iter()
+        .map(|class| format!("{} of class {class}", counts(class)))
+        .collect();
+    let shown = if run.origin.is_some() {
+        "The fitness is that on"
+    } else {
+        "Robots were trained on"
+    };
+    let conditions = if run.origin.is_some() {
+        perturbed(run)
+    } else {
+        String::new()
+    };
     let mut text = format!(
         "Bodies of at most {height} × {width} voxels (rigid, soft, two phases of muscle, shrinking and expanding \
          sensors) {made} {shown} {} images of {} ({}); each image{margin} was shown for {steps} control steps \
@@ -164,10 +216,19 @@ pub(super) fn methods(dossier: &Dossier) -> String {
         images.join(", "),
         rewarded(run.fitness()),
     );
-    if let Some(report) = dossier.findings.eval.as_ref().filter(|report| !report.means.is_empty()) {
+    if let Some(report) = dossier
+        .findings
+        .eval
+        .as_ref()
+        .filter(|report| !report.means.is_empty())
+    {
         let mean = |(task, mean): (&String, &Mean)| {
             let interval = mean.interval.map_or(String::new(), |[low, high]| {
-                format!(" (95 % bootstrap interval {}–{} %)", percent(low), percent(high))
+                format!(
+                    " (95 % bootstrap interval {}–{} %)",
+                    percent(low),
+                    percent(high)
+                )
             });
             format!("{} %{interval} on {task}", percent(mean.accuracy))
         };
@@ -176,7 +237,10 @@ pub(super) fn methods(dossier: &Dossier) -> String {
             " On {} held-out {}{} images, with displacements up to {} voxel lengths counted as wrong, {} robots \
              ({}) reached a mean accuracy of {}.",
             report.images.len(),
-            report.trained_on.as_ref().map_or(String::new(), |_| format!("{} ", report.dataset)),
+            report
+                .trained_on
+                .as_ref()
+                .map_or(String::new(), |_| format!("{} ", report.dataset)),
             report.split,
             report.threshold,
             report.robots.len(),
@@ -185,7 +249,11 @@ pub(super) fn methods(dossier: &Dossier) -> String {
         );
     }
     if let Some(audit) = &dossier.findings.audit {
-        let physical = audit.robots.iter().filter(|robot| robot.is_physical()).count();
+        let physical = audit
+            .robots
+            .iter()
+            .filter(|robot| robot.is_physical())
+            .count();
         text += &format!(
             " {} audited under changes of start, time step, material and stimulus; {physical} kept the behaviour.",
             match audit.robots.len() {
@@ -200,19 +268,33 @@ pub(super) fn methods(dossier: &Dossier) -> String {
 /// Returns the commands that reproduce a run and its tests. They omit other criteria of audits and
 /// other hyperparameters of networks.
 pub(super) fn commands(dossier: &Dossier, spell: Spell) -> String {
-    let number = dossier.namesake.map_or(String::new(), |before| format!("-{}", before + 1));
-    let again = PathBuf::from(format!("again/{}-seed{}{number}", dossier.run.name, dossier.run.config.seed));
-    let of_run = |command: &'static str| Invocation::new(command).option("archive", again.as_path());
+    let number = dossier
+        .namesake
+        .map_or(String::new(), |before| format!("-{}", before + 1));
+    let again = PathBuf::from(format!(
+        "again/{}-seed{}{number}",
+        dossier.run.name, dossier.run.config.seed
+    ));
+    let of_run =
+        |command: &'static str| Invocation::new(command).option("archive", again.as_path());
     let mut lines = made_by(dossier, &again, spell);
     let found = &dossier.findings;
     if let Some(audit) = &found.audit {
         let ids: Vec<&str> = audit.robots.iter().map(|robot| robot.id.as_str()).collect();
         let all = of_run("audit");
-        let audit = if ids.len() < audit.elites { all.option("robots", ids.join(",")) } else { all };
+        let audit = if ids.len() < audit.elites {
+            all.option("robots", ids.join(","))
+        } else {
+            all
+        };
         lines.push(spell(&audit));
     }
     if let Some(report) = &found.eval {
-        let ids: Vec<&str> = report.robots.iter().map(|robot| robot.id.as_str()).collect();
+        let ids: Vec<&str> = report
+            .robots
+            .iter()
+            .map(|robot| robot.id.as_str())
+            .collect();
         let mut eval = of_run("eval")
             .option("images", how_many(&report.images).to_string())
             .option("seed", report.seed.to_string())
@@ -241,7 +323,9 @@ pub(super) fn commands(dossier: &Dossier, spell: Spell) -> String {
 /// evenly divided, both answers mean the same.
 fn how_many(images: &[ImageRef]) -> HowMany {
     let mut counts = BTreeMap::<u8, usize>::new();
-    images.iter().for_each(|image| *counts.entry(image.label).or_default() += 1);
+    images
+        .iter()
+        .for_each(|image| *counts.entry(image.label).or_default() += 1);
     match counts.values().min().zip(counts.values().max()) {
         Some((least, most)) if most - least > 1 => HowMany::All,
         _ => HowMany::Evenly(images.len()),
@@ -253,21 +337,40 @@ fn made_by(dossier: &Dossier, again: &Path, spell: Spell) -> Vec<String> {
     let (run, config) = (&dossier.run, dossier.path.with_file_name(CONFIG));
     let Some(origin) = &run.origin else {
         let known = exists(&config);
-        let missing = format!("# CONFIG: the key \"config\" of {}", in_shell(&dossier.path));
-        let config = if known { Value::Path(config) } else { Value::Placeholder("CONFIG") };
+        let missing = format!(
+            "# CONFIG: the key \"config\" of {}",
+            in_shell(&dossier.path)
+        );
+        let config = if known {
+            Value::Path(config)
+        } else {
+            Value::Placeholder("CONFIG")
+        };
         let name = &run.dataset.name;
         let evolve = Invocation::new("evolve").option("config", config);
         let (images, evolve) = match name == BUILTIN {
             true => (None, evolve),
             false => {
                 let images = format!("# IMAGES: the folder with the files of {name}");
-                (Some(images), evolve.option("data", Value::Placeholder("IMAGES")))
+                (
+                    Some(images),
+                    evolve.option("data", Value::Placeholder("IMAGES")),
+                )
             }
         };
         let line = spell(&evolve.option("out", again));
-        return (!known).then_some(missing).into_iter().chain(images).chain([line]).collect();
+        return (!known)
+            .then_some(missing)
+            .into_iter()
+            .chain(images)
+            .chain([line])
+            .collect();
     };
-    let gaits = format!("# GAITS: run {}, SHA-256 of its content {}…", origin.name, short(&origin.sha256));
+    let gaits = format!(
+        "# GAITS: run {}, SHA-256 of its content {}…",
+        origin.name,
+        short(&origin.sha256)
+    );
     let robot = run.elites.first().and_then(|robot| robot.parent.as_deref());
     let mut train = Invocation::new("train")
         .option("archive", Value::Placeholder("GAITS"))
@@ -279,7 +382,9 @@ fn made_by(dossier: &Dossier, again: &Path, spell: Spell) -> Vec<String> {
     // The gaits' run may have other values of these.
     train = train.option("set", format!("data.dataset={}", run.config.data.dataset));
     for (key, value) in seeing_and_training(&run.config) {
-        let value = value.as_str().map_or_else(|| value.to_string(), str::to_string);
+        let value = value
+            .as_str()
+            .map_or_else(|| value.to_string(), str::to_string);
         train = train.option("set", format!("{key}={value}"));
     }
     vec![gaits, spell(&train.option("out", again))]
@@ -301,7 +406,9 @@ fn seeing_and_training(config: &Config) -> Settings {
     }
     // Files leave these out where they are 0.
     for key in ["stimulus.margin", "train.windows"] {
-        settings.entry(key.to_string()).or_insert(toml::Value::Integer(0));
+        settings
+            .entry(key.to_string())
+            .or_insert(toml::Value::Integer(0));
     }
     settings
 }
@@ -309,21 +416,28 @@ fn seeing_and_training(config: &Config) -> Settings {
 /// Adds those settings of a capacity to a command that its file has and that are not the defaults.
 fn with_settings(command: Invocation, file: &CapacityFile) -> Invocation {
     let usual = CapacityConfig::default();
-    let mut command =
-        command.switch("clean", file.patience_on != "test").switch("physical_only", file.physical_only);
+    let mut command = command
+        .switch("clean", file.patience_on != "test")
+        .switch("physical_only", file.physical_only);
     if file.trainings != usual.trainings {
         command = command.option("set", format!("trainings={}", file.trainings));
     }
     let curves: Vec<_> = file.tasks.iter().flat_map(|task| &task.curves).collect();
-    let sizes: Vec<usize> =
-        curves.iter().flat_map(|curve| curve.points.iter().map(|point| point.size)).collect();
+    let sizes: Vec<usize> = curves
+        .iter()
+        .flat_map(|curve| curve.points.iter().map(|point| point.size))
+        .collect();
     let points = curves.first().map_or(&[][..], |curve| &curve.points[..]);
     if let (Some(least), Some(most)) = (sizes.iter().min(), sizes.iter().max())
         && !usual.sizes().eq(points.iter().map(|point| point.size))
     {
-        let step = points.windows(2).next().map_or(1, |two| two[1].size.saturating_sub(two[0].size).max(1));
-        command =
-            command.option("set", format!("sizes=[{least},{most}]")).option("set", format!("step={step}"));
+        let step = points
+            .windows(2)
+            .next()
+            .map_or(1, |two| two[1].size.saturating_sub(two[0].size).max(1));
+        command = command
+            .option("set", format!("sizes=[{least},{most}]"))
+            .option("set", format!("step={step}"));
     }
     command
 }

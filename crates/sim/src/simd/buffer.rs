@@ -18,7 +18,10 @@ pub struct Buffer {
 impl Buffer {
     /// Makes a buffer of `len` equal values.
     pub fn filled(len: usize, value: f64) -> Self {
-        Buffer { blocks: vec![Block([value; BLOCK]); len.div_ceil(BLOCK)], len }
+        Buffer {
+            blocks: vec![Block([value; BLOCK]); len.div_ceil(BLOCK)],
+            len,
+        }
     }
 
     /// Makes a buffer of `len` zeros.
@@ -84,7 +87,10 @@ mod tests {
     fn a_buffer_is_a_slice_on_a_cache_line() {
         for len in [0, 1, 7, 8, 9, 100] {
             let mut buffer: Buffer = (0..len).map(f64::from).collect();
-            assert_eq!((buffer.len(), buffer.as_ptr() as usize % 64), (len as usize, 0));
+            assert_eq!(
+                (buffer.len(), buffer.as_ptr() as usize % 64),
+                (len as usize, 0)
+            );
             buffer.iter_mut().for_each(|v| *v += 0.5);
             assert!(buffer.iter().enumerate().all(|(i, v)| *v == i as f64 + 0.5));
         }

@@ -23,7 +23,10 @@ impl FloatEnvironment {
         if before & CONTROL != STANDARD & CONTROL {
             write(STANDARD);
         }
-        FloatEnvironment { before, of_thread: PhantomData }
+        FloatEnvironment {
+            before,
+            of_thread: PhantomData,
+        }
     }
 }
 
@@ -108,7 +111,12 @@ mod tests {
     #[inline(never)]
     fn computed() -> [f64; 4] {
         let (one, tiny, subnormal) = (black_box(1.0), black_box(1e-30), black_box(5e-324));
-        [one + tiny, one - tiny, black_box(f64::MIN_POSITIVE) / black_box(4.0), subnormal * black_box(1e300)]
+        [
+            one + tiny,
+            one - tiny,
+            black_box(f64::MIN_POSITIVE) / black_box(4.0),
+            subnormal * black_box(1e300),
+        ]
     }
 
     #[test]

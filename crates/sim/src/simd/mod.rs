@@ -35,8 +35,11 @@ pub enum InstructionSet {
 
 impl InstructionSet {
     /// All instruction sets, narrowest first.
-    pub const ALL: [InstructionSet; 3] =
-        [InstructionSet::Baseline, InstructionSet::Avx2, InstructionSet::Avx512];
+    pub const ALL: [InstructionSet; 3] = [
+        InstructionSet::Baseline,
+        InstructionSet::Avx2,
+        InstructionSet::Avx512,
+    ];
 
     /// Returns its name, as the environment variable `MORPHCOG_ISA` takes it.
     pub fn name(self) -> &'static str {
@@ -52,7 +55,9 @@ impl InstructionSet {
         match self {
             InstructionSet::Baseline => true,
             #[cfg(target_arch = "x86_64")]
-            InstructionSet::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
+            InstructionSet::Avx2 => {
+                is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
+            }
             #[cfg(target_arch = "x86_64")]
             InstructionSet::Avx512 => {
                 InstructionSet::Avx2.is_available()
@@ -72,10 +77,20 @@ impl InstructionSet {
         let Some(asked) = std::env::var_os("MORPHCOG_ISA").filter(|asked| !asked.is_empty()) else {
             return Ok(None);
         };
-        let available = || InstructionSet::ALL.into_iter().filter(|set| set.is_available());
+        let available = || {
+            InstructionSet::ALL
+                .into_iter()
+                .filter(|set| set.is_available())
+        };
         let found = available().find(|set| asked == set.name());
         let names: Vec<&str> = available().map(InstructionSet::name).collect();
-        let text = || format!("MORPHCOG_ISA={}: expected one of {}", asked.display(), names.join(", "));
+        let text = || {
+            format!(
+                "MORPHCOG_ISA={}: expected one of {}",
+                asked.display(),
+                names.join(", ")
+            )
+        };
         found.map(Some).ok_or_else(text)
     }
 
@@ -83,8 +98,14 @@ impl InstructionSet {
     pub fn in_use() -> Self {
         static IN_USE: OnceLock<InstructionSet> = OnceLock::new();
         *IN_USE.get_or_init(|| {
-            let widest = InstructionSet::ALL.into_iter().rfind(|set| set.is_available());
-            InstructionSet::asked().ok().flatten().or(widest).unwrap_or(InstructionSet::Baseline)
+            let widest = InstructionSet::ALL
+                .into_iter()
+                .rfind(|set| set.is_available());
+            InstructionSet::asked()
+                .ok()
+                .flatten()
+                .or(widest)
+                .unwrap_or(InstructionSet::Baseline)
         })
     }
 }
@@ -183,7 +204,9 @@ mod tests {
         fn run<L: Lanes>(self) -> Self::Output {
             let mut out = [0.0; BLOCK];
             for lane in (0..BLOCK).step_by(L::WIDTH) {
-                L::load(&self.0, lane).max_abs(L::load(&self.1, lane)).store(&mut out, lane);
+                L::load(&self.0, lane)
+                    .max_abs(L::load(&self.1, lane))
+                    .store(&mut out, lane);
             }
             out
         }
@@ -191,11 +214,28 @@ mod tests {
 
     #[test]
     fn max_abs_loses_no_nan_and_is_the_same_on_every_instruction_set() {
-        let values = [0.0, -0.0, 1e-310, -1.0, 1.5, f64::INFINITY, f64::NEG_INFINITY, f64::NAN, -f64::NAN];
-        for set in InstructionSet::ALL.into_iter().filter(|set| set.is_available()) {
+        let values = [
+            0.0,
+            -0.0,
+            1e-310,
+            -1.0,
+            1.5,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            f64::NAN,
+            -f64::NAN,
+        ];
+        for set in InstructionSet::ALL
+            .into_iter()
+            .filter(|set| set.is_available())
+        {
             for a in values {
                 for b in values {
-                    let greatest = if a.is_nan() || b.is_nan() { f64::NAN } else { a.abs().max(b.abs()) };
+                    let greatest = if a.is_nan() || b.is_nan() {
+                        f64::NAN
+                    } else {
+                        a.abs().max(b.abs())
+                    };
                     let found = dispatch(set, MaxAbs([a; BLOCK], [b; BLOCK]));
                     for lane in found {
                         assert_eq!(lane.to_bits(), greatest.to_bits(), "{set:?}: {a} and {b}");

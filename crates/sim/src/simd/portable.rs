@@ -93,7 +93,9 @@ impl Lanes for F64x4 {
 
     #[inline(always)]
     fn bits_and(self, other: Self) -> Self {
-        F64x4(each!(i in [0, 1, 2, 3] => f64::from_bits(self.0[i].to_bits() & other.0[i].to_bits())))
+        F64x4(
+            each!(i in [0, 1, 2, 3] => f64::from_bits(self.0[i].to_bits() & other.0[i].to_bits())),
+        )
     }
 
     #[inline(always)]
@@ -108,13 +110,17 @@ impl Lanes for F64x4 {
 
     #[inline(always)]
     fn max(self, other: Self) -> Self {
-        F64x4(each!(i in [0, 1, 2, 3] => if self.0[i] > other.0[i] { self.0[i] } else { other.0[i] }))
+        F64x4(
+            each!(i in [0, 1, 2, 3] => if self.0[i] > other.0[i] { self.0[i] } else { other.0[i] }),
+        )
     }
 
     #[inline(always)]
     fn max_abs(self, other: Self) -> Self {
         let (a, b) = (self.abs(), other.abs());
-        F64x4(each!(i in [0, 1, 2, 3] => if a.0[i].to_bits() > b.0[i].to_bits() { a.0[i] } else { b.0[i] }))
+        F64x4(
+            each!(i in [0, 1, 2, 3] => if a.0[i].to_bits() > b.0[i].to_bits() { a.0[i] } else { b.0[i] }),
+        )
     }
 
     #[inline(always)]

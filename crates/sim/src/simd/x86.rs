@@ -251,7 +251,10 @@ impl Lanes for F64x8 {
         let (a, b) = (self.abs().0, other.abs().0);
         // SAFETY: the processor has the instruction (see the module).
         unsafe {
-            F64x8(_mm512_castsi512_pd(_mm512_max_epi64(_mm512_castpd_si512(a), _mm512_castpd_si512(b))))
+            F64x8(_mm512_castsi512_pd(_mm512_max_epi64(
+                _mm512_castpd_si512(a),
+                _mm512_castpd_si512(b),
+            )))
         }
     }
 

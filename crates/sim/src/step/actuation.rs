@@ -77,9 +77,21 @@ mod tests {
         assert_eq!(at(Material::SensorShrink, 7, 0.25), 1.35);
         assert_eq!(at(Material::SensorExpand, 7, 0.25), 0.85);
         let width = |material, pixel| width(material, pixel, &physics);
-        assert_eq!([Material::MuscleInPhase, Material::MuscleAntiphase].map(|m| width(m, 0.7)), [1.1; 2]);
-        assert_eq!([width(Material::SensorShrink, 0.0), width(Material::SensorExpand, 0.0)], [1.6, 0.6]);
-        assert_eq!([Material::Empty, Material::Rigid, Material::Soft].map(|m| width(m, 1.0)), [1.0; 3]);
+        assert_eq!(
+            [Material::MuscleInPhase, Material::MuscleAntiphase].map(|m| width(m, 0.7)),
+            [1.1; 2]
+        );
+        assert_eq!(
+            [
+                width(Material::SensorShrink, 0.0),
+                width(Material::SensorExpand, 0.0)
+            ],
+            [1.6, 0.6]
+        );
+        assert_eq!(
+            [Material::Empty, Material::Rigid, Material::Soft].map(|m| width(m, 1.0)),
+            [1.0; 3]
+        );
         // Values outside the range are clipped, as the published robots' raw pixels were.
         assert_eq!(at(Material::SensorExpand, 0, 255.0), 1.6);
         assert_eq!(at(Material::SensorShrink, 0, 255.0), 0.6);

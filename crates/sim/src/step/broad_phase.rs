@@ -81,7 +81,11 @@ fn short_sides<L: Lanes>(System { lattice, physics }: &System, state: &State) ->
     let half = L::splat(physics.blow_up_extent / 2.0);
     let (exists, _) = lattice.exists.as_chunks::<{ FAMILIES * BLOCK }>();
     let mut short = half.gt(L::splat(0.0));
-    for slot in lattice.active_ranges.iter().flat_map(|range| range.clone().step_by(L::WIDTH)) {
+    for slot in lattice
+        .active_ranges
+        .iter()
+        .flat_map(|range| range.clone().step_by(L::WIDTH))
+    {
         let vectors = vectors::<L>(slices(&state.position, lattice.len), slot, lattice.pitch);
         let (exists, lane) = (&exists[slot / BLOCK], slot % BLOCK);
         for along in vectors {
@@ -98,13 +102,24 @@ fn short_sides<L: Lanes>(System { lattice, physics }: &System, state: &State) ->
 impl BroadPhase {
     /// Rebuilds the lists if a point has moved too far since they were made.
     #[inline(always)]
-    pub fn refresh<L: Lanes>(&mut self, system: &System, state: &State) -> Result<(), UnstableReason> {
+    pub fn refresh<L: Lanes>(
+        &mut self,
+        system: &System,
+        state: &State,
+    ) -> Result<(), UnstableReason> {
         let System { lattice, physics } = system;
         if self.made[X].len() == lattice.len {
             let budget = L::splat(BUDGET * physics.cell_size);
-            let walked = lattice.points.first().map_or(0.0, |&(p, _)| state.position[X][p] - self.made[X][p]);
+            let walked = lattice
+                .points
+                .first()
+                .map_or(0.0, |&(p, _)| state.position[X][p] - self.made[X][p]);
             let mut near = budget.gt(L::splat(0.0));
-            for slot in lattice.active_ranges.iter().flat_map(|range| range.clone().step_by(L::WIDTH)) {
+            for slot in lattice
+                .active_ranges
+                .iter()
+                .flat_map(|range| range.clone().step_by(L::WIDTH))
+            {
                 let moved = each!(axis in [X, Y] => {
                     L::load(&state.position[axis], slot) - L::load(&self.made[axis], slot)
                 });
@@ -142,10 +157,18 @@ impl BroadPhase {
             return Err(UnstableReason::BlownUp);
         }
         self.bounds.clear();
-        self.bounds.extend(lattice.surface.iter().map(|voxel| Bounds::of(&quad(voxel, state))));
+        self.bounds.extend(
+            lattice
+                .surface
+                .iter()
+                .map(|voxel| Bounds::of(&quad(voxel, state))),
+        );
         for (i, Bounds { low, high }) in self.bounds.iter().enumerate() {
             let ends = [low.x, low.y, high.x, high.y];
-            self.sides.iter_mut().zip(ends).for_each(|(side, end)| side[i] = end);
+            self.sides
+                .iter_mut()
+                .zip(ends)
+                .for_each(|(side, end)| side[i] = end);
         }
         let ground_top = f64::from(physics.ground_row) * physics.cell_size;
         self.low.clear();
@@ -177,11 +200,18 @@ impl BroadPhase {
     /// Returns true if any surface voxel of a block may be near a box.
     #[inline(always)]
     fn any_near<L: Lanes>(&self, bounds: &Bounds, block: usize, slack: f64) -> bool {
-        let [low_x, low_y, high_x, high_y] = each!(i in [0, 1, 2, 3] => L::load(&self.sides[i], block));
+        let [low_x, low_y, high_x, high_y] =
+            each!(i in [0, 1, 2, 3] => L::load(&self.sides[i], block));
         // A little more, since these comparisons are strict and touching counts.
         let reach = 1.001 * slack;
-        let (left, right) = (L::splat(bounds.low.x - reach), L::splat(bounds.high.x + reach));
-        let (bottom, top) = (L::splat(bounds.low.y - reach), L::splat(bounds.high.y + reach));
+        let (left, right) = (
+            L::splat(bounds.low.x - reach),
+            L::splat(bounds.high.x + reach),
+        );
+        let (bottom, top) = (
+            L::splat(bounds.low.y - reach),
+            L::splat(bounds.high.y + reach),
+        );
         let across = high_x.gt(left) & right.gt(low_x);
         L::any(across & high_y.gt(bottom) & top.gt(low_y))
     }
@@ -189,14 +219,21 @@ impl BroadPhase {
     /// Adds a surface voxel near another to the lists.
     fn add(&mut self, lattice: &Lattice, state: &State, [mover, host]: [usize; 2], slack: f64) {
         let (voxel, other) = (&lattice.surface[mover], &lattice.surface[host]);
-        let apart = voxel.row.abs_diff(other.row).max(voxel.column.abs_diff(other.column));
+        let apart = voxel
+            .row
+            .abs_diff(other.row)
+            .max(voxel.column.abs_diff(other.column));
         if apart > 1 && mover < host {
             self.distant.push([mover, host]);
         }
         for (corner, point) in voxel.corners.iter().enumerate() {
             let place = place(*point, state);
             if !other.corners.contains(point) && self.bounds[host].holds(place, slack) {
-                self.candidates.push(Candidate { mover, corner, host });
+                self.candidates.push(Candidate {
+                    mover,
+                    corner,
+                    host,
+                });
             }
         }
     }
@@ -210,7 +247,11 @@ impl BroadPhase {
             return false;
         }
         let bounds = |voxel: usize| Bounds::of(&quad(&lattice.surface[voxel], state));
-        let overlaps = self.distant.iter().filter(|[a, b]| bounds(*a).near(&bounds(*b), 0.0)).count();
+        let overlaps = self
+            .distant
+            .iter()
+            .filter(|[a, b]| bounds(*a).near(&bounds(*b), 0.0))
+            .count();
         (2 * overlaps) as f64 > most
     }
 }

@@ -50,7 +50,11 @@ fn nearest_edge(
         let depth = along.perp(p - a).abs() / length;
         if nearest.as_ref().is_none_or(|edge| depth < edge.depth) {
             let unit = along / length;
-            nearest = Some(Edge { ends, normal: Vector::new(-unit.y, unit.x), depth });
+            nearest = Some(Edge {
+                ends,
+                normal: Vector::new(-unit.y, unit.x),
+                depth,
+            });
         }
     }
     nearest
@@ -78,7 +82,11 @@ fn push(edge: &Edge, velocity: Vector, physics: &Physics) -> Push {
     };
     let friction = tangent * grip;
     let on_point = n * (force - physics.contact_damping * n.dot(velocity)) - friction;
-    Push { on_point, normal_force: force, friction }
+    Push {
+        on_point,
+        normal_force: force,
+        friction,
+    }
 }
 
 /// Returns the force on an end of the edge: half of the reaction, and damping of its own motion.
@@ -96,7 +104,12 @@ pub(crate) fn add_contacts(
     broad_phase: &BroadPhase,
     contact: &mut Pair,
 ) {
-    let mut contacts = Contacts { lattice, physics, state, contact };
+    let mut contacts = Contacts {
+        lattice,
+        physics,
+        state,
+        contact,
+    };
     for &voxel in &broad_phase.low {
         contacts.with_ground(&lattice.surface[voxel], start_column);
     }
@@ -115,7 +128,8 @@ struct Contacts<'a> {
 impl Contacts<'_> {
     /// Returns the true velocity of a point \[wu/s\], which includes what the limits moved.
     fn velocity(&self, point: usize) -> Vector {
-        let moved = |axis: usize| self.state.position[axis][point] - self.state.previous[axis][point];
+        let moved =
+            |axis: usize| self.state.position[axis][point] - self.state.previous[axis][point];
         Vector::new(moved(X), moved(Y)) / self.physics.time_step
     }
 
@@ -125,7 +139,10 @@ impl Contacts<'_> {
     }
 
     fn with_self(&mut self, candidate: Candidate) {
-        let (mover, host) = (&self.lattice.surface[candidate.mover], &self.lattice.surface[candidate.host]);
+        let (mover, host) = (
+            &self.lattice.surface[candidate.mover],
+            &self.lattice.surface[candidate.host],
+        );
         let host_quad = quad(host, self.state);
         let point = mover.corners[candidate.corner];
         let p = place(point, self.state);
@@ -158,7 +175,10 @@ impl Contacts<'_> {
     /// corners in the ground, and the ground's corners in it.
     fn with_ground(&mut self, voxel: &SurfaceVoxel, start_column: i64) {
         let (physics, cell) = (self.physics, self.physics.cell_size);
-        let (top, bottom) = (f64::from(physics.ground_row) * cell, f64::from(physics.ground_row - 1) * cell);
+        let (top, bottom) = (
+            f64::from(physics.ground_row) * cell,
+            f64::from(physics.ground_row - 1) * cell,
+        );
         let robot = quad(voxel, self.state);
         let bounds = Bounds::of(&robot);
         if bounds.low.y > top || bounds.high.y < bottom {
@@ -175,8 +195,14 @@ impl Contacts<'_> {
             }
             let ground = [(left, top), (right, top), (right, bottom), (left, bottom)];
             let ground = ground.map(|(x, y)| Vector::new(x, y));
-            let ground_bounds = Bounds { low: ground[3], high: ground[1] };
-            let has_peg = start_column.wrapping_add(column).rem_euclid(i64::from(physics.peg_spacing)) == 0;
+            let ground_bounds = Bounds {
+                low: ground[3],
+                high: ground[1],
+            };
+            let has_peg = start_column
+                .wrapping_add(column)
+                .rem_euclid(i64::from(physics.peg_spacing))
+                == 0;
             for corner in 0..4 {
                 let far = |quad: &[Vector; 4]| FAR_ENDS[corner].map(|end| quad[end]);
                 let (p, g) = (robot[corner], ground[corner]);
@@ -190,7 +216,8 @@ impl Contacts<'_> {
                 }
                 if bounds.holds(g, CLEAR)
                     && inside(g, &robot)
-                    && let Some(edge) = nearest_edge(g, far(&ground), &robot, &voxel.exposed, physics)
+                    && let Some(edge) =
+                        nearest_edge(g, far(&ground), &robot, &voxel.exposed, physics)
                 {
                     let push = push(&edge, Vector::ZERO, physics);
                     self.react(voxel, &edge, &push, 1.0);
@@ -208,12 +235,26 @@ mod tests {
     #[test]
     fn a_voxel_that_reaches_over_any_number_of_cells_is_soon_done_with() {
         // Not valid: in these physics nothing blows up.
-        let physics = Physics { blow_up_extent: 1e10, time_step: 0.5, ..Physics::default() };
+        let physics = Physics {
+            blow_up_extent: 1e10,
+            time_step: 0.5,
+            ..Physics::default()
+        };
         let system = System::new(&"3".parse().unwrap(), physics);
-        let mut world = World::new(system, Start { column: 493, row: 2 });
+        let mut world = World::new(
+            system,
+            Start {
+                column: 493,
+                row: 2,
+            },
+        );
         let begin = std::time::Instant::now();
         let ended = (0..2).try_for_each(|_| world.step());
-        assert!(begin.elapsed().as_secs() < 5, "{ended:?} after {:?}", begin.elapsed());
+        assert!(
+            begin.elapsed().as_secs() < 5,
+            "{ended:?} after {:?}",
+            begin.elapsed()
+        );
     }
 
     #[test]
@@ -229,11 +270,27 @@ mod tests {
             ..Physics::default()
         };
         physics.validate().unwrap();
-        let comb: Vec<String> =
-            (0..64).map(|row| if row == 0 { "34".repeat(32) } else { "30".repeat(32) }).collect();
+        let comb: Vec<String> = (0..64)
+            .map(|row| {
+                if row == 0 {
+                    "34".repeat(32)
+                } else {
+                    "30".repeat(32)
+                }
+            })
+            .collect();
         let system = System::new(&comb.join("/").parse().unwrap(), physics);
-        let mut world = World::new(system, Start { column: 493, row: 2 });
+        let mut world = World::new(
+            system,
+            Start {
+                column: 493,
+                row: 2,
+            },
+        );
         let ended = (0..5).find_map(|_| world.step().err());
-        assert_eq!(ended.map(|unstable| unstable.reason), Some(UnstableReason::Overlaps));
+        assert_eq!(
+            ended.map(|unstable| unstable.reason),
+            Some(UnstableReason::Overlaps)
+        );
     }
 }

@@ -80,9 +80,13 @@ impl Bounds {
         let low = |a: f64, b: f64| if a < b { a } else { b };
         let high = |a: f64, b: f64| if a > b { a } else { b };
         let [a, b, c, d] = quad;
-        let of =
-            |f: fn(f64, f64) -> f64| Vector::new(f(f(a.x, b.x), f(c.x, d.x)), f(f(a.y, b.y), f(c.y, d.y)));
-        Bounds { low: of(low), high: of(high) }
+        let of = |f: fn(f64, f64) -> f64| {
+            Vector::new(f(f(a.x, b.x), f(c.x, d.x)), f(f(a.y, b.y), f(c.y, d.y)))
+        };
+        Bounds {
+            low: of(low),
+            high: of(high),
+        }
     }
 
     /// Returns true if the boxes overlap when each gap may be up to `slack`; touching counts.
@@ -141,11 +145,24 @@ mod tests {
     #[test]
     fn the_boundary_is_inside() {
         let quad = square();
-        for p in [(0.05, 0.05), (0.0, 0.0), (0.1, 0.1), (0.05, 0.1), (0.0, 0.03), (0.07, 0.02), (0.02, 0.07)]
-        {
+        for p in [
+            (0.05, 0.05),
+            (0.0, 0.0),
+            (0.1, 0.1),
+            (0.05, 0.1),
+            (0.0, 0.03),
+            (0.07, 0.02),
+            (0.02, 0.07),
+        ] {
             assert!(inside(Vector::new(p.0, p.1), &quad), "{p:?}");
         }
-        for p in [(0.05, 0.1001), (-0.001, 0.05), (0.1001, 0.05), (0.05, -0.001), (0.2, 0.2)] {
+        for p in [
+            (0.05, 0.1001),
+            (-0.001, 0.05),
+            (0.1001, 0.05),
+            (0.05, -0.001),
+            (0.2, 0.2),
+        ] {
             assert!(!inside(Vector::new(p.0, p.1), &quad), "{p:?}");
         }
     }
@@ -162,6 +179,11 @@ mod tests {
         assert!(!crosses((0.0, 0.0), (0.1, 0.0), (0.11, -0.1), (0.11, 0.1)));
         assert!(!crosses((0.0, 0.0), (0.1, 0.0), (0.0, 0.0), (0.1, 0.0)));
         // Short segments count as parallel: the limit is on the raw product, not on the angle.
-        assert!(!crosses((0.0, 0.0), (0.009, 0.0), (0.005, -0.005), (0.005, 0.005)));
+        assert!(!crosses(
+            (0.0, 0.0),
+            (0.009, 0.0),
+            (0.005, -0.005),
+            (0.005, 0.005)
+        ));
     }
 }

@@ -24,7 +24,11 @@ pub(crate) struct Limits {
 impl Limits {
     pub fn new(length: f64, low: f64, high: f64) -> Self {
         let [low, high] = [low * length, high * length].map(|limit| limit * limit);
-        Limits { squares: [low, high], middle: (low + high) / 2.0, half: (high - low) / 2.0 }
+        Limits {
+            squares: [low, high],
+            middle: (low + high) / 2.0,
+            half: (high - low) / 2.0,
+        }
     }
 
     /// Returns t for a squared length beyond the limits: above 0 if too long, below if too short.
@@ -38,7 +42,9 @@ impl Limits {
     /// Returns a mask of squared lengths beyond the limits; false where `exists` is 0.
     #[inline(always)]
     pub fn beyond<L: Lanes>(&self, square: L, exists: L) -> L::Mask {
-        (square - L::splat(self.middle)).bits_and(exists).gt(L::splat(self.half))
+        (square - L::splat(self.middle))
+            .bits_and(exists)
+            .gt(L::splat(self.half))
     }
 }
 
@@ -160,8 +166,7 @@ fn limit_any<L: Lanes, const FAR: bool>(
             let t = each!(i in [0, 1, 2, 3] => L::select(beyond[i], limits[i].excess(squares[i]), zero));
             let greatest = t[0].max_abs(t[1]).max_abs(t[2].max_abs(t[3]));
             far = far | greatest.gt(L::splat(RANGE));
-            let pull =
-                each!(i in [0, 1, 2, 3] => share * if FAR { rsqrt_exact(t[i]) } else { rsqrt_series(t[i]) });
+            let pull = each!(i in [0, 1, 2, 3] => share * if FAR { rsqrt_exact(t[i]) } else { rsqrt_series(t[i]) });
             let sums = gather.next(pull, &vectors, slot);
             (L::load(from[X], slot) + sums[X]).store(to[X], slot);
             (L::load(from[Y], slot) + sums[Y]).store(to[Y], slot);
@@ -173,7 +178,11 @@ fn limit_any<L: Lanes, const FAR: bool>(
 /// Limits the sides of rigid voxels one after the other, on current positions; a side shared by two
 /// voxels is visited twice.
 pub(crate) fn limit_rigid(System { lattice, physics }: &System, [x, y]: &mut Pair) {
-    let limits = Limits::new(physics.cell_size, physics.rigid_limit_low, physics.rigid_limit_high);
+    let limits = Limits::new(
+        physics.cell_size,
+        physics.rigid_limit_low,
+        physics.rigid_limit_high,
+    );
     let [low, high] = limits.squares;
     let share = physics.rigid_limit_share / 2.0;
     let (x, y) = (&mut x[..], &mut y[..]);
@@ -211,10 +220,22 @@ impl SharedRigidPass {
         let mut points: Vec<usize> = lattice.rigid_links.iter().flatten().copied().collect();
         points.sort_unstable();
         points.dedup();
-        let place = |point: usize| points.binary_search(&point).expect("every end is among the points");
-        let links = lattice.rigid_links.iter().map(|ends| ends.map(place)).collect();
+        let place = |point: usize| {
+            points
+                .binary_search(&point)
+                .expect("every end is among the points")
+        };
+        let links = lattice
+            .rigid_links
+            .iter()
+            .map(|ends| ends.map(place))
+            .collect();
         let at = || vec![[0.0; BLOCK]; points.len()];
-        SharedRigidPass { links, at: [at(), at()], points }
+        SharedRigidPass {
+            links,
+            at: [at(), at()],
+            points,
+        }
     }
 
     /// Returns true if it is faster for this many simulations than one after the other: copying in
@@ -230,7 +251,11 @@ impl SharedRigidPass {
         System { physics, .. }: &System,
         positions: impl Iterator<Item = &'p mut Pair>,
     ) {
-        let SharedRigidPass { points, links, at: [x, y] } = self;
+        let SharedRigidPass {
+            points,
+            links,
+            at: [x, y],
+        } = self;
         let mut positions: [Option<&mut Pair>; BLOCK] = {
             let mut positions = positions;
             std::array::from_fn(|_| positions.next())
@@ -243,14 +268,22 @@ impl SharedRigidPass {
                 (x[lane], y[lane]) = (from_x[point], from_y[point]);
             }
         }
-        let limits = Limits::new(physics.cell_size, physics.rigid_limit_low, physics.rigid_limit_high);
+        let limits = Limits::new(
+            physics.cell_size,
+            physics.rigid_limit_low,
+            physics.rigid_limit_high,
+        );
         let [low, high] = each!(i in [0, 1] => L::splat(limits.squares[i]));
         let [of_low, of_high] = each!(i in [0, 1] => L::splat(1.0 / limits.squares[i]));
         let (share, zero) = (L::splat(physics.rigid_limit_share / 2.0), L::splat(0.0));
         for &[a, b] in links.iter() {
             for lane in (0..BLOCK).step_by(L::WIDTH) {
-                let [xa, xb, ya, yb] =
-                    [L::load(&x[a], lane), L::load(&x[b], lane), L::load(&y[a], lane), L::load(&y[b], lane)];
+                let [xa, xb, ya, yb] = [
+                    L::load(&x[a], lane),
+                    L::load(&x[b], lane),
+                    L::load(&y[a], lane),
+                    L::load(&y[b], lane),
+                ];
                 let (dx, dy) = (xb - xa, yb - ya);
                 let square = dx * dx + dy * dy;
                 let (long, short) = (square.gt(high), low.gt(square));

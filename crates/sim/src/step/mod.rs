@@ -40,7 +40,14 @@ impl Kernel for ControlStep<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
-        let ControlStep { system, start_column, state, scratch, mut meter, stop } = self;
+        let ControlStep {
+            system,
+            start_column,
+            state,
+            scratch,
+            mut meter,
+            stop,
+        } = self;
         for _ in 0..system.physics.substeps {
             check(stop).map_err(|Stopped| Ended::Stopped)?;
             substep::<L>(system, start_column, state, scratch, meter.as_deref_mut())
@@ -60,7 +67,9 @@ fn substep<L: Lanes>(
 ) -> Result<(), UnstableReason> {
     before_rigid::<L>(system, start_column, state, scratch, meter.as_deref_mut())?;
     limits::limit_rigid(system, &mut state.position);
-    meter.iter_mut().for_each(|meter| meter.after_limits(&state.position));
+    meter
+        .iter_mut()
+        .for_each(|meter| meter.after_limits(&state.position));
     Ok(())
 }
 
@@ -78,10 +87,18 @@ pub(crate) fn before_rigid<L: Lanes>(
         return Err(UnstableReason::Overlaps);
     }
     scratch.contact.iter_mut().for_each(|axis| axis.fill(0.0));
-    contact::add_contacts(system, start_column, state, &scratch.broad_phase, &mut scratch.contact);
+    contact::add_contacts(
+        system,
+        start_column,
+        state,
+        &scratch.broad_phase,
+        &mut scratch.contact,
+    );
     // Contacts use true velocities: position now minus position then. The integrator uses its own.
     rk4::integrate::<L>(system, state, scratch);
-    meter.iter_mut().for_each(|meter| meter.before_limits(&scratch.position));
+    meter
+        .iter_mut()
+        .for_each(|meter| meter.before_limits(&scratch.position));
     rk4::limit::<L>(system, state, scratch);
     Ok(())
 }

@@ -61,14 +61,26 @@ impl OffLattice {
 
     /// Sets the rest lengths at the start of a substep, and the load of its first stage.
     #[inline(always)]
-    pub fn first_stage<L: Lanes>(&mut self, lattice: &Lattice, goals: &[f64], gain: f64, position: &Pair) {
+    pub fn first_stage<L: Lanes>(
+        &mut self,
+        lattice: &Lattice,
+        goals: &[f64],
+        gain: f64,
+        position: &Pair,
+    ) {
         self.fetch(lattice, position);
         for at in self.lanes::<L>() {
             let (vector, square) = self.squares::<L>(at);
             let goal = each!(i in [0, 1, 2, 3] => L::load(goals, at + i * BLOCK));
             let pulls = &mut self.pulls[at / GROUP];
             let springs = &mut self.springs[at / GROUP];
-            let pull = springs.servo::<L, true>(pulls, at % GROUP, square, (goal, gain), &mut Watch::new());
+            let pull = springs.servo::<L, true>(
+                pulls,
+                at % GROUP,
+                square,
+                (goal, gain),
+                &mut Watch::new(),
+            );
             self.put(at, vector, pull);
         }
         self.load_points(lattice);
@@ -108,12 +120,17 @@ impl OffLattice {
     #[inline(always)]
     fn lanes<L: Lanes>(&self) -> impl Iterator<Item = usize> + use<L> {
         let groups = self.springs.len();
-        (0..groups * BLOCK).step_by(L::WIDTH).map(|lane| lane / BLOCK * GROUP + lane % BLOCK)
+        (0..groups * BLOCK)
+            .step_by(L::WIDTH)
+            .map(|lane| lane / BLOCK * GROUP + lane % BLOCK)
     }
 
     fn fetch(&mut self, lattice: &Lattice, position: &Pair) {
         for axis in [X, Y] {
-            for (vector, spring) in self.vector[axis].iter_mut().zip(&lattice.off_lattice_springs) {
+            for (vector, spring) in self.vector[axis]
+                .iter_mut()
+                .zip(&lattice.off_lattice_springs)
+            {
                 *vector = position[axis][spring.ends[1]] - position[axis][spring.ends[0]];
             }
         }
@@ -124,7 +141,10 @@ impl OffLattice {
         let [x, y] = each!(axis in [X, Y] => {
             each!(i in [0, 1, 2, 3] => L::load(&self.vector[axis], at + i * BLOCK))
         });
-        ([x, y], each!(i in [0, 1, 2, 3] => x[i].mul_add(x[i], y[i] * y[i])))
+        (
+            [x, y],
+            each!(i in [0, 1, 2, 3] => x[i].mul_add(x[i], y[i] * y[i])),
+        )
     }
 
     #[inline(always)]
@@ -138,7 +158,10 @@ impl OffLattice {
 
     fn load_points(&mut self, lattice: &Lattice) {
         for spring in &lattice.off_lattice_springs {
-            spring.ends.iter().for_each(|&end| (self.load[X][end], self.load[Y][end]) = (0.0, 0.0));
+            spring
+                .ends
+                .iter()
+                .for_each(|&end| (self.load[X][end], self.load[Y][end]) = (0.0, 0.0));
         }
         // Springs act on masses: their stiffness is already per mass.
         feed(lattice, &self.change, &mut self.load);

@@ -40,7 +40,13 @@ pub(crate) fn integrate<L: Lanes>(system: &System, state: &mut State, scratch: &
 /// substep become the previous ones.
 #[inline(always)]
 pub(crate) fn limit<L: Lanes>(system: &System, state: &mut State, scratch: &mut Scratch) {
-    let Scratch { position: new, carry, off_lattice, reach, .. } = scratch;
+    let Scratch {
+        position: new,
+        carry,
+        off_lattice,
+        reach,
+        ..
+    } = scratch;
     limit_all::<L>(system, new, &mut state.previous, carry, reach);
     if let Some(off_lattice) = off_lattice {
         off_lattice.limit::<L>(system, new);
@@ -53,7 +59,11 @@ pub(crate) fn limit<L: Lanes>(system: &System, state: &mut State, scratch: &mut 
 /// they must be repeated exactly. The first and the last stage detect that: between them springs
 /// hardly stretch, and points hardly fall, any further.
 #[inline(always)]
-fn later_stages<L: Lanes, const EXACT: bool>(system: &System, state: &State, scratch: &mut Scratch) -> bool {
+fn later_stages<L: Lanes, const EXACT: bool>(
+    system: &System,
+    state: &State,
+    scratch: &mut Scratch,
+) -> bool {
     let lattice = &system.lattice;
     off_lattice_stage::<L>(lattice, scratch, 0);
     second_stage::<L, EXACT>(system, state, scratch);
@@ -90,11 +100,23 @@ fn first_stage<L: Lanes, const EXACT: bool>(
     scratch: &mut Scratch,
 ) -> bool {
     let (len, pitch) = (lattice.len, lattice.pitch);
-    let Scratch { springs, goals, carry, work, off_lattice, contact, stages: [next, ..], .. } = scratch;
+    let Scratch {
+        springs,
+        goals,
+        carry,
+        work,
+        off_lattice,
+        contact,
+        stages: [next, ..],
+        ..
+    } = scratch;
     let (goals, present, gain) = (&goals[..len], &lattice.present[..len], physics.servo_gain);
     let (straight, diagonal) = (L::splat(physics.cell_size), L::splat(lattice.lengths[2]));
     let half = L::splat(physics.time_step / 2.0);
-    let (inverse_mass, drag) = (L::splat(1.0 / physics.mass), L::splat(physics.drag / physics.mass));
+    let (inverse_mass, drag) = (
+        L::splat(1.0 / physics.mass),
+        L::splat(physics.drag / physics.mass),
+    );
     let gravity = L::splat(-physics.gravity);
     let (position, velocity) = (slices(&state.position, len), slices(&state.velocity, len));
     let (contact, next) = (slices(contact, len), slices_mut(next, len));
@@ -108,7 +130,8 @@ fn first_stage<L: Lanes, const EXACT: bool>(
             let vectors = vectors(position, slot, pitch);
             let springs = &mut springs[slot / BLOCK];
             let square = squares(&vectors);
-            let pull = springs.servo::<L, EXACT>(&mut work.pulls, lane, square, (goal, gain), &mut watch);
+            let pull =
+                springs.servo::<L, EXACT>(&mut work.pulls, lane, square, (goal, gain), &mut watch);
             let force = gather.next(pull, &vectors, slot);
             let falling = [L::splat(0.0), gravity * L::load(present, slot)];
             let velocity = each!(axis in [X, Y] => L::load(velocity[axis], slot));
@@ -138,10 +161,20 @@ fn second_stage<L: Lanes, const EXACT: bool>(
     scratch: &mut Scratch,
 ) {
     let (h, len, pitch) = (physics.time_step, lattice.len, lattice.pitch);
-    let Scratch { carry, work, off_lattice, stages: [here, next, last], .. } = scratch;
+    let Scratch {
+        carry,
+        work,
+        off_lattice,
+        stages: [here, next, last],
+        ..
+    } = scratch;
     let drag = L::splat(physics.drag / physics.mass * h / 2.0);
     let (position, velocity) = (slices(&state.position, len), slices(&state.velocity, len));
-    let (here, next, last) = (slices(here, len), slices_mut(next, len), slices_mut(last, len));
+    let (here, next, last) = (
+        slices(here, len),
+        slices_mut(next, len),
+        slices_mut(last, len),
+    );
     let ([px, py], off_lattice) = (slices_mut(carry, len), off_lattice.as_ref());
     for range in &lattice.active_ranges {
         let mut gather = Gather::<L>::new([&mut *px, &mut *py], pitch);
@@ -158,7 +191,12 @@ fn second_stage<L: Lanes, const EXACT: bool>(
             });
             let here = each!(axis in [X, Y] => L::load(here[axis], slot));
             if EXACT {
-                second = floor(physics, here[Y], second, first[X].mul_add(L::splat(h / 2.0), velocity[X]));
+                second = floor(
+                    physics,
+                    here[Y],
+                    second,
+                    first[X].mul_add(L::splat(h / 2.0), velocity[X]),
+                );
             }
             each!(axis in [X, Y] => {
                 first[axis].mul_add(L::splat(h * h / 4.0), here[axis]).store(next[axis], slot);
@@ -178,7 +216,14 @@ fn third_stage<L: Lanes, const EXACT: bool>(
     scratch: &mut Scratch,
 ) {
     let (h, len, pitch) = (physics.time_step, lattice.len, lattice.pitch);
-    let Scratch { carry, work, off_lattice, stages: [_, here, _], position: new, .. } = scratch;
+    let Scratch {
+        carry,
+        work,
+        off_lattice,
+        stages: [_, here, _],
+        position: new,
+        ..
+    } = scratch;
     let drag = L::splat(physics.drag / physics.mass * h / 2.0);
     let (position, velocity) = (slices(&state.position, len), slices(&state.velocity, len));
     let (here, new) = (slices(here, len), slices_mut(new, len));
@@ -198,7 +243,12 @@ fn third_stage<L: Lanes, const EXACT: bool>(
             });
             if EXACT {
                 let y = L::load(here[Y], slot);
-                third = floor(physics, y, third, second[X].mul_add(L::splat(h / 2.0), velocity[X]));
+                third = floor(
+                    physics,
+                    y,
+                    third,
+                    second[X].mul_add(L::splat(h / 2.0), velocity[X]),
+                );
             }
             each!(axis in [X, Y] => {
                 let coasted = velocity[axis].mul_add(L::splat(h), L::load(position[axis], slot));
@@ -218,9 +268,20 @@ fn fourth_stage<L: Lanes, const EXACT: bool>(
     scratch: &mut Scratch,
 ) -> bool {
     let (h, len, pitch) = (physics.time_step, lattice.len, lattice.pitch);
-    let Scratch { carry, work, off_lattice, stages: [_, _, here], velocity: new, .. } = scratch;
+    let Scratch {
+        carry,
+        work,
+        off_lattice,
+        stages: [_, _, here],
+        velocity: new,
+        ..
+    } = scratch;
     let drag = L::splat(physics.drag / physics.mass * h);
-    let (here, velocity, new) = (slices(here, len), slices(&state.velocity, len), slices_mut(new, len));
+    let (here, velocity, new) = (
+        slices(here, len),
+        slices(&state.velocity, len),
+        slices_mut(new, len),
+    );
     let ([px, py], off_lattice) = (slices_mut(carry, len), off_lattice.as_ref());
     let mut watch = Watch::<L>::new();
     for range in &lattice.active_ranges {
@@ -228,7 +289,9 @@ fn fourth_stage<L: Lanes, const EXACT: bool>(
         for slot in range.clone().step_by(L::WIDTH) {
             let (work, lane) = (&work[slot / BLOCK], slot % BLOCK);
             let vectors = vectors(here, slot, pitch);
-            let pull = work.pulls.at::<L, EXACT>(lane, squares(&vectors), Some(&mut watch));
+            let pull = work
+                .pulls
+                .at::<L, EXACT>(lane, squares(&vectors), Some(&mut watch));
             let force = gather.next(pull, &vectors, slot);
             let load = load_of::<L>(work, off_lattice, slot);
             let third = each!(axis in [X, Y] => L::load(&work.third[axis], lane));
@@ -239,7 +302,12 @@ fn fourth_stage<L: Lanes, const EXACT: bool>(
             let y = L::load(here[Y], slot);
             watch.points(y);
             if EXACT {
-                fourth = floor(physics, y, fourth, third[X].mul_add(L::splat(h), velocity[X]));
+                fourth = floor(
+                    physics,
+                    y,
+                    fourth,
+                    third[X].mul_add(L::splat(h), velocity[X]),
+                );
             }
             each!(axis in [X, Y] => {
                 let middle = L::load(&work.second[axis], lane) + third[axis];
@@ -278,7 +346,8 @@ fn floor<L: Lanes>(physics: &Physics, y: L, acceleration: [L; 2], velocity: L) -
 fn add_floor(physics: &Physics, width: usize, [ax, ay, y, vx]: &mut [[f64; BLOCK]; 4]) {
     for i in (0..width).filter(|&i| y[i] < 0.0) {
         let normal = -physics.floor_stiffness * y[i];
-        let friction = physics.floor_friction * normal * libm::tanh(physics.floor_slip * normal * vx[i]);
+        let friction =
+            physics.floor_friction * normal * libm::tanh(physics.floor_slip * normal * vx[i]);
         ay[i] += normal / physics.mass;
         ax[i] -= friction / physics.mass;
     }

@@ -9,14 +9,25 @@ pub(crate) const RANGE: f64 = 1.0 / 64.0;
 /// amplify errors there. A fit that spreads later terms over these would lessen the greatest error
 /// and spoil that near 0. 1 − 1/√(1 + t) is off by at most 6e-14 anywhere in the range, and only by
 /// rounding for |t| up to 1/400.
-pub(crate) const TERMS: [f64; 6] =
-    [1.0 / 2.0, -3.0 / 8.0, 5.0 / 16.0, -35.0 / 128.0, 63.0 / 256.0, -231.0 / 1024.0];
+pub(crate) const TERMS: [f64; 6] = [
+    1.0 / 2.0,
+    -3.0 / 8.0,
+    5.0 / 16.0,
+    -35.0 / 128.0,
+    63.0 / 256.0,
+    -231.0 / 1024.0,
+];
 
 /// Returns 1 − 1/√(1 + t) for t in range.
 #[inline(always)]
 pub(crate) fn rsqrt_series<L: Lanes>(t: L) -> L {
     let [c0, c1, c2, c3, c4, c5] = each!(i in [0, 1, 2, 3, 4, 5] => L::splat(TERMS[i]));
-    t * c5.mul_add(t, c4).mul_add(t, c3).mul_add(t, c2).mul_add(t, c1).mul_add(t, c0)
+    t * c5
+        .mul_add(t, c4)
+        .mul_add(t, c3)
+        .mul_add(t, c2)
+        .mul_add(t, c1)
+        .mul_add(t, c0)
 }
 
 /// Returns 1 − 1/√(1 + t) for any t.

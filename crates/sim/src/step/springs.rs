@@ -28,7 +28,10 @@ pub(crate) struct Watch<L> {
 impl<L: Lanes> Watch<L> {
     #[inline(always)]
     pub fn new() -> Self {
-        Watch { stretch: L::splat(0.0), depth: L::splat(0.0) }
+        Watch {
+            stretch: L::splat(0.0),
+            depth: L::splat(0.0),
+        }
     }
 
     /// Watches springs for which the series must hold.
@@ -80,7 +83,11 @@ pub(crate) struct Pulls {
 impl Pulls {
     pub const ZERO: Pulls = {
         let zeros = [[0.0; BLOCK]; FAMILIES];
-        Pulls { inverse_square: zeros, initial: zeros, change: zeros }
+        Pulls {
+            inverse_square: zeros,
+            initial: zeros,
+            change: zeros,
+        }
     };
 
     /// Returns the pull of each spring per vector at later squared lengths in the same substep.
@@ -109,9 +116,14 @@ impl Springs {
     pub fn blocks(stiffness: &[f64], mass: f64, gain: f64) -> Vec<Self> {
         let block = |of: &[f64]| Springs {
             inverse_length: [[0.0; BLOCK]; FAMILIES],
-            driven: std::array::from_fn(|f| std::array::from_fn(|i| of[f * BLOCK + i] / mass * gain)),
+            driven: std::array::from_fn(|f| {
+                std::array::from_fn(|i| of[f * BLOCK + i] / mass * gain)
+            }),
         };
-        stiffness.chunks_exact(FAMILIES * BLOCK).map(block).collect()
+        stiffness
+            .chunks_exact(FAMILIES * BLOCK)
+            .map(block)
+            .collect()
     }
 
     /// Forgets the lengths of the last substep.
@@ -191,7 +203,12 @@ impl<'a, L: Lanes> Gather<'a, L> {
     #[inline(always)]
     pub fn new(carry: [&'a mut [f64]; 2], pitch: usize) -> Self {
         let nothing = [L::splat(0.0); 2];
-        Gather { carry, pitch, beside: nothing, below: nothing }
+        Gather {
+            carry,
+            pitch,
+            beside: nothing,
+            below: nothing,
+        }
     }
 
     /// Returns the sum of all pulls on the points at the next slot, given those of its own springs.

@@ -51,7 +51,10 @@ impl Reference {
 
     /// At its beginning.
     pub fn world(&self, physics: &Physics) -> World {
-        let start = Start { column: self.start_column, row: self.start_row };
+        let start = Start {
+            column: self.start_column,
+            row: self.start_row,
+        };
         let mut world = World::new(self.system(physics), start);
         world.set_stimulus(&self.stimulus);
         world
@@ -59,7 +62,10 @@ impl Reference {
 
     /// The largest distance of EvoGym from itself at other columns \[voxel lengths\].
     pub fn spread(&self) -> f64 {
-        self.evogym_elsewhere.iter().map(|other| other.largest_difference_voxels).fold(0.0, f64::max)
+        self.evogym_elsewhere
+            .iter()
+            .map(|other| other.largest_difference_voxels)
+            .fold(0.0, f64::max)
     }
 }
 
@@ -72,14 +78,21 @@ pub fn golden<T: DeserializeOwned>(name: &str) -> T {
 /// `tests/golden`, for the program's tests as well.
 fn folder() -> PathBuf {
     let folders = ["tests/golden", "crates/sim/tests/golden"];
-    let mut folders = folders.map(|folder| Path::new(env!("CARGO_MANIFEST_DIR")).join(folder)).into_iter();
-    folders.find(|folder| folder.is_dir()).expect("it is part of the project")
+    let mut folders = folders
+        .map(|folder| Path::new(env!("CARGO_MANIFEST_DIR")).join(folder))
+        .into_iter();
+    folders
+        .find(|folder| folder.is_dir())
+        .expect("it is part of the project")
 }
 
 /// The names of a folder's simulations, in order.
 fn names(folder: &Path) -> Vec<String> {
-    let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name());
-    let names = files.filter_map(|name| Some(name.to_str().unwrap().strip_suffix(".json.gz")?.to_string()));
+    let files = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name());
+    let names =
+        files.filter_map(|name| Some(name.to_str().unwrap().strip_suffix(".json.gz")?.to_string()));
     let mut names: Vec<String> = names.filter(|name| name != "published_robots").collect();
     names.sort();
     names
@@ -95,7 +108,10 @@ pub fn references() -> Vec<Reference> {
 /// All simulations in which small differences grow.
 pub fn sensitive() -> Vec<Reference> {
     let names = names(&folder().join("sensitive"));
-    let all: Vec<Reference> = names.iter().map(|name| golden(&format!("sensitive/{name}"))).collect();
+    let all: Vec<Reference> = names
+        .iter()
+        .map(|name| golden(&format!("sensitive/{name}")))
+        .collect();
     assert_eq!(all.len(), 4);
     all
 }
