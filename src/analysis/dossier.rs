@@ -6,7 +6,7 @@ use crate::base::remedy::Remedy;
 use crate::base::text::counted;
 use crate::config::Config;
 use crate::data::dataset::Split;
-use crate::images::whereabouts::{Whereabouts, load_dataset_of, see};
+use crate::images::whereabouts::{Whereabouts, load_dataset_of, stimulus_of};
 use crate::search::held_out_run::control_steps;
 use crate::shipped::exists;
 use crate::store::audit::AuditFile;
@@ -251,7 +251,7 @@ impl Team {
         let seen = |config: &Config| {
             let one = |place: &usize| {
                 let ImageRef { index, label } = file.images[*place];
-                let stimulus = see(config, &dataset, split, index)?;
+                let stimulus = stimulus_of(config, &dataset, split, index)?;
                 Ok(LabelledStimulus {
                     class: label,
                     label: format!("{label} ({split} {index})"),
@@ -329,7 +329,7 @@ fn images(
     check_length(&run.config, shown.len()).map_err(without)?;
     let one = |image: &ImageRef| {
         let label = format!("{} (train {})", image.label, image.index);
-        let seen = see(&run.config, &dataset, Split::Train, image.index);
+        let seen = stimulus_of(&run.config, &dataset, Split::Train, image.index);
         let seen = seen.map_err(|error| {
             error
                 .in_place("training_images")

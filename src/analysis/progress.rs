@@ -35,7 +35,7 @@ pub(crate) struct SettingsGroup<'a> {
 }
 
 /// Runs in groups, in the order of their first ones, and the keys in which these differ.
-pub(crate) fn alike(runs: &[Progress]) -> (Vec<String>, Vec<SettingsGroup<'_>>) {
+pub(crate) fn group_by_settings(runs: &[Progress]) -> (Vec<String>, Vec<SettingsGroup<'_>>) {
     let mut groups: Vec<Vec<&Progress>> = Vec::new();
     for run in runs {
         match groups
@@ -146,7 +146,7 @@ mod tests {
             "\"map.parents\" = 2",
         );
         let runs = [run(1, a), run(1, b), run(2, a)];
-        let (keys, groups) = alike(&runs);
+        let (keys, groups) = group_by_settings(&runs);
         assert_eq!(keys, ["map.parents", "task.groups"]);
         let labels: Vec<(&str, usize)> = groups
             .iter()
@@ -154,7 +154,7 @@ mod tests {
             .collect();
         assert_eq!(labels, [("parents=1, 0|1", 2), ("parents=2", 1)]);
         assert_eq!(groups[1].values, [Some("2".to_string()), None]);
-        let (keys, groups) = alike(&runs[..1]);
+        let (keys, groups) = group_by_settings(&runs[..1]);
         assert_eq!((keys.len(), groups[0].label.as_str()), (0, "toy"));
     }
 }

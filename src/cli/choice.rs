@@ -104,7 +104,7 @@ pub(super) fn warn_of_versions<'a>(
     archives: impl IntoIterator<Item = &'a PathBuf>,
     console: &Console,
 ) {
-    let of_others: Vec<(PathBuf, String)> = meant(archives)
+    let of_others: Vec<(PathBuf, String)> = unnamed_or_newest(archives)
         .filter_map(|path| RunFile::other_version(&path).map(|version| (path, version)))
         .collect();
     let Some(((path, _), others)) = of_others.split_first() else {
@@ -127,7 +127,9 @@ pub(super) fn warn_of_versions<'a>(
 }
 
 /// Returns the paths of these archives, or of the newest run if there are none; omits named ones.
-fn meant<'a>(archives: impl IntoIterator<Item = &'a PathBuf>) -> impl Iterator<Item = PathBuf> {
+fn unnamed_or_newest<'a>(
+    archives: impl IntoIterator<Item = &'a PathBuf>,
+) -> impl Iterator<Item = PathBuf> {
     let mut archives: Vec<PathBuf> = archives.into_iter().cloned().collect();
     if archives.is_empty() {
         archives.extend(folder::newest_run());
@@ -142,7 +144,7 @@ pub(super) fn say_unfinished<'a>(
     console: &Console,
 ) {
     // Named runs do not go on.
-    for path in meant(archives) {
+    for path in unnamed_or_newest(archives) {
         if let Some((done, asked)) = RunFile::progress(&path).filter(|(done, asked)| done < asked) {
             console.info(&format!(
                 "{}: generation {done} of {asked}: the run is not at its end",

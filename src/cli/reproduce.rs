@@ -6,7 +6,7 @@ use crate::base::shell::quoted;
 use crate::cli::in_session;
 use crate::cli::output::console::Console;
 use crate::cli::output::networks;
-use crate::cli::tasks::{Command, What, Where, asked, ended};
+use crate::cli::tasks::{Command, TaskRequest, TaskResources, ended, handle_request};
 use crate::cli::values::decimal;
 use crate::commands::plan::{PAPER_TOML, PaperPlan};
 use crate::commands::reproduce;
@@ -47,9 +47,9 @@ pub(super) struct ReproduceArgs {
     #[arg(short, long, value_name = "DIR", default_value = "reproduction")]
     out: PathBuf,
     #[command(flatten)]
-    what: What,
+    what: TaskRequest,
     #[command(flatten)]
-    place: Where,
+    place: TaskResources,
 }
 
 pub(super) fn run(args: ReproduceArgs, console: &Console) -> Result<(), Error> {
@@ -71,7 +71,7 @@ pub(super) fn run(args: ReproduceArgs, console: &Console) -> Result<(), Error> {
             .iter()
             .flat_map(|set| ["--set".to_string(), quoted(set)]),
     );
-    if asked(
+    if handle_request(
         &args.what,
         &tasks,
         &Command {

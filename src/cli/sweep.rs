@@ -6,7 +6,9 @@ use crate::base::text::counted;
 use crate::cli::in_session;
 use crate::cli::output::console::Console;
 use crate::cli::output::sweeps;
-use crate::cli::tasks::{Command, What, Where, asked, ended, refused, warn_of_gaits};
+use crate::cli::tasks::{
+    Command, TaskRequest, TaskResources, ended, handle_request, refused, warn_of_gaits,
+};
 use crate::commands::sweep::SweepPlan;
 use crate::commands::tasks::TaskFolders;
 use crate::commands::{collect, tasks};
@@ -59,12 +61,12 @@ pub(super) struct SweepArgs {
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
-    what: What,
+    what: TaskRequest,
     /// Collect the results of all tasks: sweep.csv, and figures.
     #[arg(long, conflicts_with_all = ["task", "list", "slurm", "status"])]
     collect: bool,
     #[command(flatten)]
-    place: Where,
+    place: TaskResources,
 }
 
 pub(super) fn run(args: SweepArgs, console: &Console) -> Result<(), Error> {
@@ -87,7 +89,7 @@ pub(super) fn run(args: SweepArgs, console: &Console) -> Result<(), Error> {
             .iter()
             .flat_map(|set| ["--set".to_string(), quoted(set)]),
     );
-    if asked(
+    if handle_request(
         &args.what,
         &tasks,
         &Command {

@@ -27,7 +27,7 @@ const LEAST_SECONDS: u32 = 10;
 /// A request other than to run all tasks here.
 #[derive(Debug, Args)]
 #[group(multiple = false)]
-pub(super) struct What {
+pub(super) struct TaskRequest {
     /// Do one task, or go on with it: its number from 1 (default: that of HQ_TASK_ID,
     /// SLURM_ARRAY_TASK_ID or PBS_ARRAY_INDEX).
     #[arg(long, value_name = "N", num_args = 0..=1, value_parser = whole::<usize>(0..=MOST))]
@@ -45,7 +45,7 @@ pub(super) struct What {
 
 /// Resources of the tasks.
 #[derive(Debug, Args)]
-pub(super) struct Where {
+pub(super) struct TaskResources {
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
     pub(super) data: Option<PathBuf>,
@@ -57,7 +57,7 @@ pub(super) struct Where {
     pub(super) threads: Option<u16>,
 }
 
-impl Where {
+impl TaskResources {
     /// Returns the resources of a session.
     pub(super) fn with(&self) -> Resources {
         Resources::of(self.threads, self.data.clone())
@@ -75,7 +75,7 @@ pub(super) struct Command<'a> {
     /// Folders of the tasks.
     pub(super) place: &'a TaskFolders,
     /// Resources of the tasks.
-    pub(super) with: &'a Where,
+    pub(super) with: &'a TaskResources,
 }
 
 impl Command<'_> {
@@ -217,8 +217,8 @@ pub(super) fn warn_of_gaits(tasks: &[Task], console: &Console) {
 }
 
 /// Handles a request other than to run all tasks; returns false if there is none.
-pub(super) fn asked(
-    what: &What,
+pub(super) fn handle_request(
+    what: &TaskRequest,
     tasks: &[Task],
     command: &Command,
     console: &Console,

@@ -12,7 +12,7 @@ use crate::config::Config;
 use crate::config::audit::Criteria;
 use crate::data::dataset::Split;
 use crate::images::training::TrainingImages;
-use crate::images::whereabouts::{Whereabouts, load_dataset_of, see};
+use crate::images::whereabouts::{Whereabouts, load_dataset_of, stimulus_of};
 use crate::robots;
 use crate::robots::published;
 use crate::robots::selection::Selection;
@@ -292,7 +292,7 @@ fn training_of(
         *taken <= IMAGES_PER_CLASS
     });
     let see = |image: &crate::store::images::ImageRef| {
-        let seen = see(&run.config, &dataset, Split::Train, image.index);
+        let seen = stimulus_of(&run.config, &dataset, Split::Train, image.index);
         seen.map_err(|error| {
             error
                 .in_place("training_images")

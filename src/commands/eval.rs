@@ -126,7 +126,7 @@ pub fn eval(options: &EvalOptions, session: &Session) -> Result<EvalOutcome, Err
                 .map(|_| opened.own(&[Split::Train]))
                 .transpose()?;
             let of_runs = others.as_ref().unwrap_or(dataset);
-            let best = validation::chosen(
+            let best = validation::best_of_runs(
                 sources,
                 &robots,
                 &options.robots,
@@ -268,7 +268,7 @@ pub(crate) fn is_of_robots(
         }
         return Ok(true);
     }
-    let (_, grouping) = together(sources)?;
+    let (_, grouping) = common_setting(sources)?;
     let chosen = options.robots.of(sources, options.seed)?;
     let chosen = chosen
         .iter()
@@ -278,7 +278,7 @@ pub(crate) fn is_of_robots(
 }
 
 /// Returns the config under which robots of several runs see images together, and all their tasks.
-fn together(sources: &[StoredRun]) -> Result<(Config, Grouping), Error> {
+fn common_setting(sources: &[StoredRun]) -> Result<(Config, Grouping), Error> {
     // Trainings may have found different windows; the baselines use what all see together.
     let configs = || sources.iter().map(|source| &source.run.config);
     let config = Config::together(configs()).expect("there is a run");
@@ -319,7 +319,7 @@ impl<'o> Opened<'o> {
             ));
         }
         let sources = sources(options)?;
-        let (config, grouping) = together(&sources)?;
+        let (config, grouping) = common_setting(&sources)?;
         let wanted = wanted(options, &config)?;
         let other = options
             .dataset

@@ -267,7 +267,7 @@ pub(crate) fn endings(out: Option<&Path>) -> Result<Vec<&'static str>, Error> {
     let Some(path) = out else {
         return Ok(vec!["svg", "png"]);
     };
-    folder::of_file(path)?;
+    folder::check_is_file_path(path)?;
     match path
         .extension()
         .map(|ending| ending.to_string_lossy().to_lowercase())

@@ -7,7 +7,7 @@ use crate::body::Body;
 use crate::config::{Config, DataConfig};
 use crate::data::dataset::Split;
 use crate::images::training::TrainingImages;
-use crate::images::whereabouts::{Whereabouts, load_dataset_of, see};
+use crate::images::whereabouts::{Whereabouts, load_dataset_of, stimulus_of};
 use crate::robots;
 use crate::robots::published;
 use crate::robots::selection::Selection;
@@ -231,7 +231,7 @@ pub(crate) fn subject(options: &ReplayOptions) -> Result<ReplaySubject, Error> {
                     }
                     (None, _) => Error::input(format!("training_images: {error}")),
                 })?;
-        let stimulus = see(config, &dataset, split, index)?;
+        let stimulus = stimulus_of(config, &dataset, split, index)?;
         images.push(LabelledStimulus {
             class: label,
             label: format!("{label} ({split} {index})"),

@@ -7,7 +7,7 @@ use crate::base::text::counted;
 use crate::commands::plan::PaperPlan;
 use crate::commands::table::TableRow;
 use crate::commands::tasks::all::check_test;
-use crate::commands::tasks::steps::written;
+use crate::commands::tasks::steps::or_write_error;
 use crate::commands::tasks::task::another;
 use crate::commands::tasks::{self, Run, Steps, Task, TaskFolders, TasksSummary};
 use crate::commands::{audit, capacity, eval, plan, table};
@@ -220,7 +220,7 @@ impl Job<'_> {
             out: self.place.out.join(format!("{name}-capacity.json")),
         };
         let finished = capacity::capacity(&options, self.session)?;
-        let file = written(finished.file, finished.unwritten)?;
+        let file = or_write_error(finished.file, finished.unwritten)?;
         if file.stopped {
             return Ok(None);
         }
@@ -301,7 +301,7 @@ impl Job<'_> {
                 out: source.path.with_file_name(AUDIT_JSON),
             };
             let finished = audit::audit(&options, self.session)?;
-            let file = written(finished.file, finished.unwritten)?;
+            let file = or_write_error(finished.file, finished.unwritten)?;
             if finished.stopped {
                 return Ok(None);
             }
@@ -349,7 +349,7 @@ impl Job<'_> {
             self.plan.images
         ));
         let finished = eval::eval(&options, self.session)?;
-        let report = written(finished.file, finished.unwritten)?;
+        let report = or_write_error(finished.file, finished.unwritten)?;
         let is_whole = !report.stopped && !self.session.stop.load(Ordering::Relaxed);
         Ok(is_whole.then_some(report))
     }

@@ -12,7 +12,7 @@ use crate::config::train::MOST_RANDOM_IMAGES;
 use crate::config::{Config, DataConfig, MAX_NUMBER};
 use crate::data::dataset::{Dataset, DatasetError, Split};
 use crate::images::training::scarcest;
-use crate::images::whereabouts::{Whereabouts, load_dataset_of, say_transposed, seen};
+use crate::images::whereabouts::{Whereabouts, load_dataset_of, say_transposed, stimulus_for};
 use crate::response::estimate::teachable;
 use crate::response::gait::Gait;
 use crate::response::lesson::Example;
@@ -382,7 +382,7 @@ fn task(
     let dataset = load_dataset_of(of_run, &config, &whereabouts, &[Split::Train])?;
     training::check_groups(groups, &dataset)?;
     say_transposed(&dataset, &config.data, session);
-    let config = training::sized(
+    let config = training::with_fitting_margin(
         config,
         &provenance.dataset,
         &provenance.config,
@@ -411,7 +411,7 @@ fn task(
     };
     // Images that cannot be seen must be refused before anything is measured.
     task.images.first().map_or(Ok(()), |image| {
-        task.seen(&task.config.stimulus, image).map(drop)
+        task.stimulus_for(&task.config.stimulus, image).map(drop)
     })?;
     Ok(Some(task))
 }
@@ -471,8 +471,12 @@ fn setting(
 }
 
 impl Task {
-    fn seen(&self, stimulus: &StimulusParams, image: &ImageRef) -> Result<Grid<f64>, Error> {
-        seen(
+    fn stimulus_for(
+        &self,
+        stimulus: &StimulusParams,
+        image: &ImageRef,
+    ) -> Result<Grid<f64>, Error> {
+        stimulus_for(
             &self.config.body,
             stimulus,
             &self.dataset,
@@ -500,7 +504,7 @@ impl Task {
         let [first, _] = self.groups.classes();
         let ways = balanced(self.images.iter().map(|image| image.label), first);
         let example = |(image, (right, weight)): (&ImageRef, (f64, f64))| {
-            let seen = self.seen(&stimulus, image)?;
+            let seen = self.stimulus_for(&stimulus, image)?;
             Ok(Example {
                 right,
                 weight,

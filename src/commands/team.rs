@@ -13,7 +13,9 @@ use crate::commands::eval::images::chosen_by;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
 use crate::images::held_out::{images_besides, test_images};
-use crate::images::whereabouts::{Whereabouts, load_dataset_of, part_of_others, see, see_all};
+use crate::images::whereabouts::{
+    Whereabouts, load_dataset_of, part_of_others, stimuli_of, stimulus_of,
+};
 use crate::robots::selection::{BEST, Chosen, Selection, VALIDATED};
 use crate::search::held_out_run::Trial;
 use crate::search::held_out_run::{CYCLES, HeldOutRun, control_steps, task_of};
@@ -26,7 +28,7 @@ use crate::store::stored_run::StoredRun;
 use crate::store::team::Accuracy;
 use crate::store::team::{FORMAT, FORMAT_VERSION, Member, TeamBaselines, TeamFile};
 use crate::store::unwritten::Unwritten;
-use crate::store::validation::shown as shown_for_validation;
+use crate::store::validation::most_images as shown_for_validation;
 use crate::task::answer::Readout;
 use crate::task::answer::THRESHOLD;
 use crate::task::fitness::Group;
@@ -168,7 +170,7 @@ pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutco
             continue;
         }
         let run = &sources[chosen.source].run;
-        let stimuli = see_all(&run.config, &dataset, split, &images)?;
+        let stimuli = stimuli_of(&run.config, &dataset, split, &images)?;
         let control_steps = control_steps(&run.config, CYCLES);
         let walker = HeldOutRun::new(&run.config, control_steps, done, session)?;
         let Some((displacements, _)) = walker.rollouts(chosen.robot, &stimuli) else {
@@ -412,14 +414,14 @@ fn baselines(
             .iter()
             .flat_map(|class| indices(*class))
             .filter(|(index, _)| !shown.contains(index));
-        let seen = |(index, class)| Ok((see(config, dataset, Split::Train, index)?, class));
+        let seen = |(index, class)| Ok((stimulus_of(config, dataset, Split::Train, index)?, class));
         besides
             .map(seen)
             .collect::<Result<Vec<(Grid<f64>, u8)>, Error>>()
     };
     let training = training_of(&common, classes)?;
     let known = labelled(&training);
-    let stimuli = see_all(&common, dataset, split, &file.images)?;
+    let stimuli = stimuli_of(&common, dataset, split, &file.images)?;
     let labels = || file.images.iter().map(|image| image.label);
     let moments = PixelMoments::new(&known);
     let against_rest = |class: &u8| {
@@ -472,7 +474,8 @@ fn baselines(
         }
         let training = training_of(config, &[a, b])?;
         let linear = PixelMoments::new(&labelled(&training)).apart(&[a], &[b]);
-        let value = |image: &ImageRef| Ok(linear.value(&see(config, dataset, split, image.index)?));
+        let value =
+            |image: &ImageRef| Ok(linear.value(&stimulus_of(config, dataset, split, image.index)?));
         Ok((
             judge,
             file.images

@@ -22,11 +22,11 @@ use crate::store::stored_run::StoredRun;
 use crate::store::training::Origin;
 use crate::store::validation::Validated;
 use crate::task::grouping::Groups;
-use crate::training::gaits::{Walker, key, measured, origin, walkers};
+use crate::training::gaits::{Candidate, candidates, key, measured, origin};
 use crate::training::log::Log;
 use crate::training::rounds::TrainedDesign;
 use crate::training::trainer::Trainer;
-use crate::training::{check_groups, config_of, sized, with_images};
+use crate::training::{check_groups, config_of, with_fitting_margin, with_images};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -89,7 +89,7 @@ pub fn train(options: &TrainOptions, session: &Session) -> Result<TrainOutcome, 
     check_groups(&options.groups, &dataset)?;
     whereabouts::say_transposed(&dataset, &config.data, session);
     let of_gaits = &source.run;
-    let config = sized(
+    let config = with_fitting_margin(
         config,
         &of_gaits.dataset,
         &of_gaits.config,
@@ -102,7 +102,7 @@ pub fn train(options: &TrainOptions, session: &Session) -> Result<TrainOutcome, 
     let mut training = TrainingImages::of(&config, &dataset)?;
     let classes = training.images.iter().map(|image| image.label);
     training.conditions = config.train.perturbations.of(classes);
-    let walkers = walkers(&source, &options.robots, &config.train, config.seed)?;
+    let walkers = candidates(&source, &options.robots, &config.train, config.seed)?;
     // The seed is that of the gaits: a response holds for every task and training seed.
     let probing = Probing::new(&training.conditions, source.run.config.seed);
     let measured = measured(&source, &config, &probing, &walkers, session);
@@ -187,7 +187,7 @@ fn run_file(
     config: &Config,
     training: &TrainingImages,
     origin: Origin,
-    walker: &Walker,
+    walker: &Candidate,
     taught: &TrainedDesign,
 ) -> Result<RunFile, Error> {
     let body = taught.body.clone();

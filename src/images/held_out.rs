@@ -27,7 +27,11 @@ pub(crate) fn trained_on(run: &RunFile, dataset: &Dataset) -> Result<BTreeSet<us
 }
 
 /// Returns the images of each class that are not in `seen`.
-fn left(classes: &[u8], seen: &BTreeSet<usize>, dataset: &Dataset) -> Vec<Vec<ImageRef>> {
+fn unused_by_class(
+    classes: &[u8],
+    seen: &BTreeSet<usize>,
+    dataset: &Dataset,
+) -> Vec<Vec<ImageRef>> {
     let of_class = |&label: &u8| {
         let all = dataset.indices_of(Split::Train, label).iter();
         let free = all.filter(|&index| !seen.contains(index));
@@ -97,7 +101,7 @@ pub(crate) fn check(
         .collect();
     seen.extend(before);
     let classes = config.classes();
-    let left = left(&classes, &seen, dataset);
+    let left = unused_by_class(&classes, &seen, dataset);
     per_class(&classes, &left, None, HowMany::Evenly(images))
         .map(|_| ())
         .map_err(|error| {
@@ -159,7 +163,7 @@ pub(crate) fn images_besides(
     for run in runs {
         seen.extend(trained_on(run, dataset)?);
     }
-    let left = left(classes, &seen, dataset);
+    let left = unused_by_class(classes, &seen, dataset);
     let per_class =
         per_class(classes, &left, argument, how_many).map_err(|error| match most(&left) {
             0 => error.advice("every image of that class was trained on; show test images"),

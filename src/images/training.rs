@@ -5,7 +5,7 @@ use crate::base::error::Error;
 use crate::base::remedy::Remedy;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, DatasetError, Split};
-use crate::images::whereabouts::{load_dataset, see};
+use crate::images::whereabouts::{load_dataset, stimulus_of};
 use crate::store::images::{DatasetRef, ImageRef, answers};
 use crate::task::answer::Answer;
 use crate::task::perturbation::Condition;
@@ -115,7 +115,7 @@ impl TrainingImages {
     /// As [`TrainingImages::load`].
     pub fn of(config: &Config, dataset: &Dataset) -> Result<Self, Error> {
         let images = TrainingImages::images(config, dataset)?;
-        let seen = |image: &ImageRef| see(config, dataset, Split::Train, image.index);
+        let seen = |image: &ImageRef| stimulus_of(config, dataset, Split::Train, image.index);
         let stimuli: Vec<Grid<f64>> = images.iter().map(seen).collect::<Result<_, _>>()?;
         let train_sha256 = dataset
             .fingerprint(Split::Train)

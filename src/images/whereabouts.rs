@@ -301,20 +301,20 @@ pub(crate) fn part_of_others(
 ///
 /// # Errors
 /// Returns an error if the image does not fit the body's size.
-pub fn see(
+pub fn stimulus_of(
     config: &Config,
     dataset: &Dataset,
     split: Split,
     index: usize,
 ) -> Result<Grid<f64>, Error> {
-    seen(&config.body, &config.stimulus, dataset, split, index)
+    stimulus_for(&config.body, &config.stimulus, dataset, split, index)
 }
 
 /// Returns several images as a robot of a config sees them, in their order.
 ///
 /// # Errors
-/// As [`see`].
-pub(crate) fn see_all(
+/// As [`stimulus_of`].
+pub(crate) fn stimuli_of(
     config: &Config,
     dataset: &Dataset,
     split: Split,
@@ -322,7 +322,7 @@ pub(crate) fn see_all(
 ) -> Result<Vec<Grid<f64>>, Error> {
     images
         .iter()
-        .map(|image| see(config, dataset, split, image.index))
+        .map(|image| stimulus_of(config, dataset, split, image.index))
         .collect()
 }
 
@@ -330,7 +330,7 @@ pub(crate) fn see_all(
 ///
 /// # Errors
 /// Returns an error if the image does not fit the body's size.
-pub(crate) fn seen(
+pub(crate) fn stimulus_for(
     &BodyConfig { height, width, .. }: &BodyConfig,
     params: &StimulusParams,
     dataset: &Dataset,

@@ -12,7 +12,7 @@ use crate::config::Config;
 use crate::config::validation::ValidationConfig;
 use crate::data::dataset::{Dataset, Split};
 use crate::images::held_out::images;
-use crate::images::whereabouts::{Whereabouts, load_dataset_of, see_all};
+use crate::images::whereabouts::{Whereabouts, load_dataset_of, stimuli_of};
 use crate::robots::selection::{Chosen, Selection, first_physical};
 use crate::search::held_out_run;
 use crate::search::held_out_run::HeldOutRun;
@@ -95,7 +95,7 @@ pub(crate) fn validate(
         &whereabouts,
         &[Split::Train],
     )?;
-    ranked(&source, count, &dataset, session)
+    rank(&source, count, &dataset, session)
 }
 
 /// Chooses as many robots as the config of a finished run wants, with data already loaded.
@@ -108,10 +108,10 @@ pub(crate) fn at_end(
     session: &Session,
 ) -> Result<Option<Vec<Validated>>, Error> {
     let source = StoredRun::read(archive)?;
-    ranked(&source, source.run.config.validation.best, dataset, session)
+    rank(&source, source.run.config.validation.best, dataset, session)
 }
 
-fn ranked(
+fn rank(
     source: &StoredRun,
     count: usize,
     dataset: &Dataset,
@@ -135,7 +135,7 @@ fn ranked(
         argument: None,
         threshold: answer::THRESHOLD,
     };
-    let best = best(source, dataset, &grouping, robots, &wanted, &walker)?;
+    let best = best_of_run(source, dataset, &grouping, robots, &wanted, &walker)?;
     Ok(best.map(|best| best.into_iter().map(|(_, validated)| validated).collect()))
 }
 
@@ -143,8 +143,8 @@ fn ranked(
 /// results; `None` if stopped.
 ///
 /// # Errors
-/// As [`best`] and [`first_physical`].
-pub(crate) fn chosen<'a>(
+/// As [`best_of_run`] and [`first_physical`].
+pub(crate) fn best_of_runs<'a>(
     sources: &'a [StoredRun],
     robots: &[Chosen<'a>],
     selection: &Selection,
@@ -168,7 +168,8 @@ pub(crate) fn chosen<'a>(
             wanted.count
         };
         let searched = Wanted { count, ..*wanted };
-        let Some(ranked) = best(source, dataset, grouping, own, &searched, &walker()?)? else {
+        let Some(ranked) = best_of_run(source, dataset, grouping, own, &searched, &walker()?)?
+        else {
             return Ok(None);
         };
         let ranked = if is_physical {
@@ -193,7 +194,7 @@ pub(crate) fn chosen<'a>(
 ///
 /// # Errors
 /// Returns an error if there are not enough images, or if the result cannot be kept.
-pub(crate) fn best<'a>(
+pub(crate) fn best_of_run<'a>(
     source: &'a StoredRun,
     dataset: &Dataset,
     grouping: &Grouping,
@@ -354,7 +355,7 @@ fn screened(
     walker: &HeldOutRun,
 ) -> Result<Option<Vec<Validated>>, Error> {
     let config: &Config = &run.config;
-    let stimuli = see_all(config, dataset, Split::Train, images)?;
+    let stimuli = stimuli_of(config, dataset, Split::Train, images)?;
     let split_of = |robot: &Robot| -> Option<&grouping::ClassSplit> {
         grouping
             .tasks()

@@ -231,7 +231,7 @@ pub fn name_of(config: &str) -> String {
 /// # Errors
 /// Returns an error if they cannot.
 pub(crate) fn check_out(out: &Path, of: &Path, own: &str) -> Result<(), Error> {
-    of_file(out)?;
+    check_is_file_path(out)?;
     let refuse = |text: &str| Err(Error::argument("out", out.display(), text));
     let csv = out.with_extension("csv");
     if csv == *out {
@@ -327,7 +327,7 @@ fn not_of_run(path: &Path) -> Result<(), Error> {
 ///
 /// # Errors
 /// Returns an error if it does not.
-pub(crate) fn of_file(path: &Path) -> Result<(), Error> {
+pub(crate) fn check_is_file_path(path: &Path) -> Result<(), Error> {
     let last = path.as_os_str().as_encoded_bytes().last();
     let ends_open = last.is_some_and(|&byte| std::path::is_separator(byte.into()));
     match ends_open || path.file_name().is_none() {

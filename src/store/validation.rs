@@ -155,7 +155,7 @@ pub(crate) fn ranking(source: &StoredRun) -> Result<Option<Vec<Validated>>, Erro
 ///
 /// # Errors
 /// If it cannot be read.
-pub(crate) fn shown(source: &StoredRun) -> Result<Option<usize>, Error> {
+pub(crate) fn most_images(source: &StoredRun) -> Result<Option<usize>, Error> {
     let Some(file) = ValidationFile::read(&source.path.with_file_name(VALIDATION_JSON))? else {
         return Ok(None);
     };

@@ -18,7 +18,7 @@ pub struct Answer {
     pub(crate) displacement: Option<f64>,
 }
 
-pub(super) fn of_split(
+pub(super) fn answers_of_split(
     split: &ClassSplit,
     answers: &[Answer],
 ) -> impl Iterator<Item = (Group, Option<f64>)> + Clone {
@@ -74,7 +74,7 @@ pub(crate) struct Assignment {
 impl Assignment {
     /// Returns the assignment under which a robot's training answers are fitter (A left in a tie).
     pub(crate) fn from_training(split: &ClassSplit, fitness: Fitness, answers: &[Answer]) -> Self {
-        let (a_right, a_left) = fitness.of_assignments(of_split(split, answers));
+        let (a_right, a_left) = fitness.of_assignments(answers_of_split(split, answers));
         Assignment {
             a: if a_right > a_left {
                 Direction::Right

@@ -6,7 +6,7 @@
 //! things follow that make savings lossless: fitness is continuous (d = 0 counts as wrong, with
 //! margin 0), and the fitness on some of the images is an upper bound of that on all.
 
-use crate::task::answer::{Answer, Assignment, of_split};
+use crate::task::answer::{Answer, Assignment, answers_of_split};
 use crate::task::fitness::Group;
 use crate::task::fitness::{Fitness, better};
 use crate::task::grouping::{ClassSplit, Grouping};
@@ -30,7 +30,10 @@ impl Grouping {
     /// Returns the fitness on a task, or an **upper bound** of it while some answers are missing.
     /// Images of classes in neither of its groups do not count.
     pub(crate) fn fitness_on(&self, split: &ClassSplit, answers: &[Answer]) -> f64 {
-        better(self.fitness().of_assignments(of_split(split, answers)))
+        better(
+            self.fitness()
+                .of_assignments(answers_of_split(split, answers)),
+        )
     }
 
     /// Returns the task that a robot performs, which is the one it is fittest on (the first wins a

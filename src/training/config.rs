@@ -58,9 +58,9 @@ pub(crate) fn config_of(
     };
     let asked = base.clone();
     let check = |config: &Config| {
-        fixed(config, &asked)
+        check_fixed_keys(config, &asked)
             .and_then(|()| config.validate())
-            .and_then(|()| enough(config, groups))
+            .and_then(|()| check_final_images(config, groups))
     };
     let config = reading::changed(base, set, check, |error| error)?;
     let BodyConfig { height, width, .. } = of_walkers.body;
@@ -90,7 +90,7 @@ pub(crate) fn config_of(
 
 /// Checks that designs are compared on an image of every class. The groups alternate; the first
 /// begins.
-fn enough(config: &Config, [a, b]: &[Vec<u8>; 2]) -> Result<(), Error> {
+fn check_final_images(config: &Config, [a, b]: &[Vec<u8>; 2]) -> Result<(), Error> {
     let (found, least) = (
         config.train.final_images,
         (2 * a.len()).saturating_sub(1).max(2 * b.len()),
@@ -105,7 +105,7 @@ fn enough(config: &Config, [a, b]: &[Vec<u8>; 2]) -> Result<(), Error> {
 }
 
 /// Checks that no key overrides a setting that every training fixes.
-fn fixed(config: &Config, asked: &Config) -> Result<(), Error> {
+fn check_fixed_keys(config: &Config, asked: &Config) -> Result<(), Error> {
     let fixed = [
         (
             "generations",
@@ -140,7 +140,7 @@ fn fixed(config: &Config, asked: &Config) -> Result<(), Error> {
 /// Drops the margin inherited from the gaits' config if the new images have another size, unless
 /// `set` asks for it. `of_gaits` is the gaits' config; `their_data` is the dataset they were
 /// trained on.
-pub(crate) fn sized(
+pub(crate) fn with_fitting_margin(
     config: Config,
     their_data: &DatasetRef,
     of_gaits: &Config,

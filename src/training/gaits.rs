@@ -22,7 +22,7 @@ use crate::task::protocol::{Protocol, RolloutMode};
 use std::collections::BTreeSet;
 
 /// A candidate gait and the robot it belongs to.
-pub(crate) struct Walker<'a> {
+pub(crate) struct Candidate<'a> {
     pub(crate) robot: &'a Robot,
     pub(crate) gait: Gait,
 }
@@ -72,13 +72,13 @@ pub(crate) fn origin(
     })
 }
 
-pub(crate) fn walkers<'a>(
+pub(crate) fn candidates<'a>(
     source: &'a StoredRun,
     robots: &Selection,
     train: &TrainConfig,
     seed: u64,
-) -> Result<Vec<Walker<'a>>, Error> {
-    let mut walkers: Vec<Walker> = Vec::new();
+) -> Result<Vec<Candidate<'a>>, Error> {
+    let mut walkers: Vec<Candidate> = Vec::new();
     let mut chosen = robots.of(std::slice::from_ref(source), seed)?;
     if train.rounds == 0 {
         // One robot is refined as it is: the fittest, or the first of equals.
@@ -92,7 +92,7 @@ pub(crate) fn walkers<'a>(
             .iter()
             .all(|other| other.gait.probe() != gait.probe())
         {
-            walkers.push(Walker {
+            walkers.push(Candidate {
                 robot: chosen.robot,
                 gait,
             });
@@ -114,7 +114,7 @@ pub(crate) fn measured(
     source: &StoredRun,
     config: &Config,
     probing: &Probing,
-    walkers: &[Walker],
+    walkers: &[Candidate],
     session: &Session,
 ) -> Vec<Batch> {
     let nothing = || vec![Vec::new(); walkers.len()];
@@ -148,7 +148,7 @@ pub(crate) fn measured(
 pub(crate) fn key(
     config: &Config,
     seed_of_gaits: u64,
-    walkers: &[Walker],
+    walkers: &[Candidate],
     training: &TrainingImages,
 ) -> String {
     let bodies: Vec<String> = walkers

@@ -13,4 +13,4 @@ pub(crate) mod trainer;
 pub(crate) mod window;
 
 pub(crate) use config::check;
-pub(crate) use config::{check_groups, config_of, sized, with_images};
+pub(crate) use config::{check_groups, config_of, with_fitting_margin, with_images};

@@ -40,7 +40,7 @@ const DOUBT: f64 = 0.05;
 const OTHER_GAITS: f64 = 0.4;
 
 /// Binary logarithm of the most sensors that change: 1, 2, 4, 8 or 16.
-const MOST_SENSORS: u32 = 4;
+const MOST_SENSORS_LOG2: u32 = 4;
 
 /// Most voxels that change in a challenger with another gait.
 const MOST_VOXELS: usize = 3;
@@ -285,7 +285,7 @@ impl<'a> Refinement<'a> {
         let design = gait.design();
         let mut lesson = DesignProblem::new(&examples, &slopes, &design);
         let places: Vec<usize> = (0..design.len()).filter(|_| random.unit() < 0.5).collect();
-        lesson.best_changes(&places, 1 << random.below(MOST_SENSORS as usize + 1));
+        lesson.best_changes(&places, 1 << random.below(MOST_SENSORS_LOG2 as usize + 1));
         let solved = lesson.design();
         if solved != design {
             return gait.built(&solved);

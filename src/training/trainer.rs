@@ -9,7 +9,7 @@ use crate::base::text::counted;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
 use crate::images::training::TrainingImages;
-use crate::images::whereabouts::see;
+use crate::images::whereabouts::stimulus_of;
 use crate::response::gait::Gait;
 use crate::response::lesson::Example;
 use crate::response::probing::{Probing, response};
@@ -18,7 +18,7 @@ use crate::store::images::ImageRef;
 use crate::store::training::Batch;
 use crate::task::grouping::balanced;
 use crate::task::perturbation::Condition;
-use crate::training::gaits::Walker;
+use crate::training::gaits::Candidate;
 use crate::training::log::{Kept, Log, stopped};
 use crate::training::race::Challenge;
 use crate::training::rollouts::Image;
@@ -62,7 +62,7 @@ impl Trainer<'_> {
     /// Returns the config with the window that has the best prediction for a gait.
     fn with_window(
         &self,
-        walker: &Walker,
+        walker: &Candidate,
         response: &Response,
         log: &Log,
         session: &Session,
@@ -109,7 +109,7 @@ impl Trainer<'_> {
         let ways = balanced(training.images.iter().map(|image| image.label), first);
         let image =
             |((image, condition), (right, weight)): ((&ImageRef, &Condition), (f64, f64))| {
-                let stimulus = see(config, self.dataset, Split::Train, image.index)?;
+                let stimulus = stimulus_of(config, self.dataset, Split::Train, image.index)?;
                 let condition = all
                     .iter()
                     .position(|other| other == condition)
@@ -150,15 +150,15 @@ impl Trainer<'_> {
     /// Trains all gaits for one round, then continues with the one that has the best prediction.
     pub(crate) fn train<'w>(
         &self,
-        walkers: &'w [Walker<'w>],
+        walkers: &'w [Candidate<'w>],
         log: &mut Log,
         session: &Session,
-    ) -> Result<(&'w Walker<'w>, Config, TrainedDesign), Error> {
+    ) -> Result<(&'w Candidate<'w>, Config, TrainedDesign), Error> {
         let plan = self.plan();
         let Trainer {
             config, probing, ..
         } = self;
-        let mut best: Option<(&Walker, Config, GaitTrainer)> = None;
+        let mut best: Option<(&Candidate, Config, GaitTrainer)> = None;
         for (walker, measured) in walkers.iter().zip(&self.measured) {
             let (gait, robot) = (&walker.gait, &walker.robot.id);
             log.begins(

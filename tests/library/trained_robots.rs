@@ -8,7 +8,7 @@ use morphcog::base::session::Session;
 use morphcog::body::Body;
 use morphcog::data::dataset::{Dataset, Split};
 use morphcog::data::files::places;
-use morphcog::images::whereabouts::see;
+use morphcog::images::whereabouts::stimulus_of;
 use morphcog::search::held_out_run::CYCLES;
 use morphcog::store::audit::AuditFile;
 use morphcog::store::eval::EvalFile;
@@ -83,7 +83,8 @@ fn walks(run: &RunFile, mnist: &Dataset, images: &[ImageRef]) -> Vec<Option<f64>
 }
 
 fn walks_of(run: &RunFile, body: &Body, mnist: &Dataset, images: &[ImageRef]) -> Vec<Option<f64>> {
-    let stimulus = |image: &ImageRef| see(&run.config, mnist, Split::Test, image.index).unwrap();
+    let stimulus =
+        |image: &ImageRef| stimulus_of(&run.config, mnist, Split::Test, image.index).unwrap();
     let stimuli: Vec<Grid<f64>> = images.iter().map(stimulus).collect();
     let control_steps = CYCLES * run.config.physics.cycle_steps;
     let protocol = Protocol {

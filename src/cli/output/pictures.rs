@@ -110,7 +110,7 @@ impl PicturesWanted {
     /// # Errors
     /// Returns an error if the extension is no known format, or a file cannot be written.
     pub(crate) fn named(path: &Path, formats: &[Format]) -> Result<Self, Error> {
-        folder::of_file(path)?;
+        folder::check_is_file_path(path)?;
         let files = match path
             .extension()
             .map(|ending| ending.to_string_lossy().into_owned())

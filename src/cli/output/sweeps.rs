@@ -1,6 +1,6 @@
 //! The results of `sweep` and `reproduce`.
 
-use crate::analysis::progress::alike;
+use crate::analysis::progress::group_by_settings;
 use crate::analysis::sweep::{Collected, Columns, SweepRow, csv};
 use crate::base::error::Error;
 use crate::base::files::write_atomically;
@@ -186,7 +186,7 @@ fn table(console: &Console, rows: &[SweepRow]) {
 
 /// Writes the keys in which runs differ, a line per group that differs only in the seed.
 pub(crate) fn differences(console: &Console, runs: &[crate::analysis::progress::Progress]) {
-    let (keys, groups) = alike(runs);
+    let (keys, groups) = group_by_settings(runs);
     if groups.len() < 2 || console.mode() != Mode::Human {
         return;
     }

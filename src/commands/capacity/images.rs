@@ -9,7 +9,7 @@ use crate::base::session::Session;
 use crate::baseline::{NetworkKind, Samples, Trained, train};
 use crate::config::capacity::CapacityConfig;
 use crate::data::dataset::{Dataset, Split};
-use crate::images::whereabouts::{Whereabouts, seen};
+use crate::images::whereabouts::{Whereabouts, stimulus_for};
 use crate::store::eval::EvalFile;
 use crate::store::images::ImageRef;
 use crate::store::names::RUN_JSON;
@@ -56,7 +56,7 @@ impl Images {
         }
         let see = |split: Split, images: &[ImageRef]| -> Result<Vec<Seen>, Error> {
             let one = |image: &ImageRef| {
-                let stimulus = seen(
+                let stimulus = stimulus_for(
                     &setting.body,
                     &setting.stimulus,
                     &dataset,

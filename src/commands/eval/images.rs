@@ -8,12 +8,12 @@ use crate::data::dataset::{Dataset, Split};
 use crate::images::held_out;
 use crate::images::held_out::images_besides;
 use crate::images::training::TrainingImages;
-use crate::images::whereabouts::{see, see_all};
+use crate::images::whereabouts::{stimuli_of, stimulus_of};
 use crate::store::eval::Baselines;
 use crate::store::images::{HeldOut, HowMany, ImageRef};
 use crate::store::run::RunFile;
 use crate::store::stored_run::StoredRun;
-use crate::store::validation::shown as shown_for_validation;
+use crate::store::validation::most_images as shown_for_validation;
 use crate::task::grouping;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -78,11 +78,11 @@ impl<'a> HeldOutImages<'a> {
             }
         };
         let split = draw.split.split();
-        let stimuli = see_all(config, dataset, split, &images)?;
+        let stimuli = stimuli_of(config, dataset, split, &images)?;
         // Every rank refuses images that a run's robots cannot see, before the first rollout.
         if let Some(first) = images.first() {
             for source in sources {
-                see(&source.run.config, dataset, split, first.index)?;
+                stimulus_of(&source.run.config, dataset, split, first.index)?;
             }
         }
         Ok(HeldOutImages {
@@ -101,9 +101,8 @@ impl<'a> HeldOutImages<'a> {
     pub(crate) fn seen_by(&self, config: &Config) -> Result<Cow<'_, [Grid<f64>]>, Error> {
         match config.stimulus == self.config.stimulus {
             true => Ok(Cow::Borrowed(&self.stimuli)),
-            false => {
-                see_all(config, self.dataset, self.draw.split.split(), &self.images).map(Cow::Owned)
-            }
+            false => stimuli_of(config, self.dataset, self.draw.split.split(), &self.images)
+                .map(Cow::Owned),
         }
     }
 
@@ -117,7 +116,7 @@ impl<'a> HeldOutImages<'a> {
         tasks: impl Iterator<Item = (&'t str, &'t grouping::ClassSplit)>,
     ) -> Result<BTreeMap<String, Baselines>, Error> {
         let seen = |images: &[ImageRef]| -> Result<Vec<(Grid<f64>, u8)>, Error> {
-            let stimulus = |index| see(self.config, self.dataset, Split::Train, index);
+            let stimulus = |index| stimulus_of(self.config, self.dataset, Split::Train, index);
             images
                 .iter()
                 .map(|image| Ok((stimulus(image.index)?, image.label)))
@@ -128,7 +127,7 @@ impl<'a> HeldOutImages<'a> {
         let is_own = self.dataset.name() == self.config.data.dataset;
         let of_runs = sources.iter().map(|source| {
             let path = source.path.display().to_string();
-            let own = taught_with(&source.run, self.dataset).and_then(|images| seen(&images));
+            let own = images_trained_on(&source.run, self.dataset).and_then(|images| seen(&images));
             let own = own.map_err(|error| error.in_place("training_images").in_place(&path))?;
             Ok((source.run.config.grouping()?, own))
         });
@@ -194,7 +193,7 @@ impl<'a> HeldOutImages<'a> {
 }
 
 /// Returns all images a run's robots were trained on; the file of a training has only the last.
-fn taught_with(run: &RunFile, dataset: &Dataset) -> Result<Vec<ImageRef>, Error> {
+fn images_trained_on(run: &RunFile, dataset: &Dataset) -> Result<Vec<ImageRef>, Error> {
     match run.origin {
         Some(_) => TrainingImages::images(&run.config, dataset),
         None => Ok(run.training_images.clone()),

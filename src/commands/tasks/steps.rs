@@ -125,8 +125,8 @@ fn steps(task: &Task, place: &TaskFolders, session: &Session) -> Result<(), Erro
                 out: folder.clone(),
                 if_exists: IfExists::Resume,
             };
-            let finished = evolve::evolve(&options, session).map_err(of_task)?;
-            if written(finished.stopped, finished.unwritten)? {
+            let finished = evolve::evolve(&options, session).map_err(with_task_remedies)?;
+            if or_write_error(finished.stopped, finished.unwritten)? {
                 return Err(stopped());
             }
         }
@@ -143,7 +143,7 @@ fn steps(task: &Task, place: &TaskFolders, session: &Session) -> Result<(), Erro
             };
             let trained = train::train(&options, session).map_err(|error| match error.kind {
                 ErrorKind::Stopped => stopped(),
-                _ => of_task(error),
+                _ => with_task_remedies(error),
             })?;
             if trained.validated.is_none() {
                 return Err(stopped());
@@ -172,7 +172,7 @@ fn steps(task: &Task, place: &TaskFolders, session: &Session) -> Result<(), Erro
             out: folder.join(AUDIT_JSON),
         };
         let finished = audit::audit(&options, session)?;
-        if written(finished.stopped, finished.unwritten)? {
+        if or_write_error(finished.stopped, finished.unwritten)? {
             return Err(stopped());
         }
     }
@@ -181,7 +181,7 @@ fn steps(task: &Task, place: &TaskFolders, session: &Session) -> Result<(), Erro
             return Ok(());
         }
         let finished = eval::eval(&options, session)?;
-        if written(finished.file.stopped, finished.unwritten)? {
+        if or_write_error(finished.file.stopped, finished.unwritten)? {
             return Err(stopped());
         }
     }
@@ -190,7 +190,7 @@ fn steps(task: &Task, place: &TaskFolders, session: &Session) -> Result<(), Erro
 
 /// Adapts the remedies of a run's error. A task always resumes, so a run that cannot be resumed is
 /// another one, in the way.
-fn of_task(error: Error) -> Error {
+fn with_task_remedies(error: Error) -> Error {
     let is_in_the_way = error.remedies.iter().any(|remedy| match remedy {
         Remedy::Resume | Remedy::Replace => true,
         // A run of another kind, which another command goes on with.
@@ -219,7 +219,7 @@ fn of_task(error: Error) -> Error {
 }
 
 /// Returns a result that later steps read from its file, or the error of writing it.
-pub(crate) fn written<T>(found: T, unwritten: Option<Error>) -> Result<T, Error> {
+pub(crate) fn or_write_error<T>(found: T, unwritten: Option<Error>) -> Result<T, Error> {
     match unwritten {
         None => Ok(found),
         Some(error) => Err(error.remedy(Remedy::Repeat)),

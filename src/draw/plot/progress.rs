@@ -1,6 +1,6 @@
 //! The figure of a run's progress: QD score, coverage and best fitness over evaluations.
 
-use crate::analysis::progress::{Progress, SettingsGroup, alike};
+use crate::analysis::progress::{Progress, SettingsGroup, group_by_settings};
 use crate::draw::colour;
 use crate::draw::colour::Colour;
 use crate::draw::plot::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};
@@ -41,7 +41,7 @@ const DASHES: [Option<[f64; 2]>; 4] = [None, Some([4.0, 1.6]), Some([1.0, 1.6]),
 /// only in the seed become one line, their median, in a band from the least to the largest value,
 /// up to the end of the shortest. Other runs have lines and colours of their own.
 pub(crate) fn progress(runs: &[Progress]) -> Figure {
-    let (_, groups) = alike(runs);
+    let (_, groups) = group_by_settings(runs);
     let mut canvas = Canvas::new();
     let of = names(runs);
     let is_band = groups.iter().any(|group| group.runs.len() > 1);
