@@ -4,8 +4,8 @@
 mod common;
 
 mod architecture;
+mod constants;
 mod data_fetch;
 mod idx_reader;
-mod pinned_numbers;
 mod published_robots;
 mod trained_robots;
