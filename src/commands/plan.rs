@@ -82,7 +82,7 @@ impl PaperPlan {
             ..plan.clone()
         };
         let check = |plan: &PaperPlan| {
-            plan.check()
+            plan.validate()
                 .and_then(|()| placed(plan).experiments().map(|_| ()))
         };
         let plan = reading::changed(plan, overrides, check, |error| {
@@ -91,7 +91,7 @@ impl PaperPlan {
         Ok(placed(&plan))
     }
 
-    fn check(&self) -> Result<(), Error> {
+    fn validate(&self) -> Result<(), Error> {
         let refuse = |key: &str, text: &str| Err(Error::input(text.to_string()).with_key(key));
         if self.seeds.is_empty() || self.experiment.is_empty() {
             return refuse(
@@ -106,10 +106,10 @@ impl PaperPlan {
             return refuse("images", "robots, images: expected 1 or more");
         }
         self.audit
-            .check()
+            .validate()
             .map_err(|error| error.with_key("audit"))?;
         self.capacity
-            .check()
+            .validate()
             .map_err(|error| error.with_key("capacity"))
     }
 

@@ -120,11 +120,11 @@ impl Scenario {
     /// As [`Scenario::read`].
     pub(crate) fn parse(text: &str, name: &str) -> Result<Self, Error> {
         let scenario: Scenario = reading::read_json(text, name)?;
-        scenario.check().map_err(|error| error.in_place(name))?;
+        scenario.validate().map_err(|error| error.in_place(name))?;
         Ok(scenario)
     }
 
-    fn check(&self) -> Result<(), Error> {
+    fn validate(&self) -> Result<(), Error> {
         let refuse = |text: String| Err(Error::input(text));
         self.physics
             .validate()

@@ -94,14 +94,14 @@ impl SweepPlan {
         let name = path.display().to_string();
         let format = reading::Format::of(path);
         let plan: SweepPlan = reading::read(&text, format, &name)?;
-        let check = |plan: &SweepPlan| plan.check();
+        let check = |plan: &SweepPlan| plan.validate();
         reading::changed(plan, overrides, check, |error| {
             reading::placed(error, &text, format, &name)
         })
     }
 
     /// Checks what the types cannot, but no task.
-    fn check(&self) -> Result<(), Error> {
+    fn validate(&self) -> Result<(), Error> {
         match (&self.config, &self.archive) {
             (Some(_), Some(_)) => {
                 return Err(Error::at_key(
@@ -145,7 +145,7 @@ impl SweepPlan {
         }
         self.groups()?;
         self.varied()?;
-        self.steps().check(self.archive.is_some())
+        self.steps().validate(self.archive.is_some())
     }
 
     fn steps(&self) -> Steps {
@@ -542,7 +542,7 @@ mod tests {
 
     fn plan(text: &str) -> SweepPlan {
         let plan: SweepPlan = toml::from_str(text).unwrap();
-        plan.check().unwrap();
+        plan.validate().unwrap();
         plan
     }
 
@@ -652,7 +652,7 @@ mod tests {
         ] {
             let plan: SweepPlan = toml::from_str(text).unwrap();
             assert_eq!(
-                plan.check().unwrap_err().key.as_deref(),
+                plan.validate().unwrap_err().key.as_deref(),
                 Some(key),
                 "{text}"
             );

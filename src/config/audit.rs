@@ -50,11 +50,11 @@ impl Criteria {
     /// # Errors
     /// Returns an error, with file, line and key, if the criteria are invalid.
     pub(crate) fn load(path: Option<&Path>, overrides: &[String]) -> Result<Self, Error> {
-        reading::load(path, overrides, Criteria::check)
+        reading::load(path, overrides, Criteria::validate)
     }
 
     /// Checks what types cannot.
-    pub(crate) fn check(&self) -> Result<(), Error> {
+    pub(crate) fn validate(&self) -> Result<(), Error> {
         let Sizes {
             start,
             time_step,

@@ -64,11 +64,11 @@ impl CapacityConfig {
     /// # Errors
     /// Returns an error if they are invalid.
     pub fn load(path: Option<&Path>, overrides: &[String]) -> Result<Self, Error> {
-        reading::load(path, overrides, CapacityConfig::check)
+        reading::load(path, overrides, CapacityConfig::validate)
     }
 
     /// Checks what types cannot.
-    pub(crate) fn check(&self) -> Result<(), Error> {
+    pub(crate) fn validate(&self) -> Result<(), Error> {
         let refuse =
             |key: &str, text: &str| Err(Error::input(format!("capacity: {text}")).with_key(key));
         let [from, to] = self.sizes;

@@ -458,7 +458,7 @@ impl Config {
         }
         self.data
             .builtin
-            .check()
+            .validate()
             .map_err(|error| Error::at_key("data.builtin", error))?;
         for (key, side) in [
             ("body.height", self.body.height),

@@ -67,7 +67,7 @@ impl BuiltinDigits {
     ///
     /// # Errors
     /// Returns a [`BuiltinError`] otherwise.
-    pub(crate) fn check(&self) -> Result<(), BuiltinError> {
+    pub(crate) fn validate(&self) -> Result<(), BuiltinError> {
         if self.classes.is_empty() {
             return Err(BuiltinError::NoClasses);
         }
@@ -209,15 +209,15 @@ mod tests {
             classes: classes.to_vec(),
             ..BuiltinDigits::default()
         };
-        assert_eq!(with(&[]).check(), Err(BuiltinError::NoClasses));
-        assert_eq!(with(&[3, 10]).check(), Err(BuiltinError::NotADigit(10)));
+        assert_eq!(with(&[]).validate(), Err(BuiltinError::NoClasses));
+        assert_eq!(with(&[3, 10]).validate(), Err(BuiltinError::NotADigit(10)));
         let many = BuiltinDigits {
             test_per_class: usize::MAX,
             ..BuiltinDigits::default()
         };
-        assert_eq!(many.check(), Err(BuiltinError::TooMany(usize::MAX)));
-        assert_eq!(with(&[3, 1, 3]).check(), Err(BuiltinError::Repeated(3)));
-        assert_eq!(with(&[9, 0]).check(), Ok(()));
+        assert_eq!(many.validate(), Err(BuiltinError::TooMany(usize::MAX)));
+        assert_eq!(with(&[3, 1, 3]).validate(), Err(BuiltinError::Repeated(3)));
+        assert_eq!(with(&[9, 0]).validate(), Ok(()));
     }
 
     #[test]

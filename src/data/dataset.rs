@@ -169,9 +169,9 @@ impl Dataset {
     /// Makes built-in digits with the given parameters. Images are drawn on request.
     ///
     /// # Errors
-    /// Returns [`DatasetError::Builtin`] if [`BuiltinDigits::check`] fails.
+    /// Returns [`DatasetError::Builtin`] if [`BuiltinDigits::validate`] fails.
     pub(crate) fn builtin(digits: BuiltinDigits, wanted: &[Split]) -> Result<Self, DatasetError> {
-        digits.check()?;
+        digits.validate()?;
         let loaded = |&split: &Split| {
             let labels = (0..).map_while(|i| digits.label(split, i)).collect();
             (split, Loaded::new(labels, Images::Drawn(digits.clone())))

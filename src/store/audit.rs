@@ -91,8 +91,8 @@ impl RobotAudit {
 impl Stored for AuditFile {
     const FORMAT: (&'static str, u32) = (FORMAT, FORMAT_VERSION);
 
-    fn check(&self) -> Result<(), Error> {
-        self.criteria.check()?;
+    fn validate(&self) -> Result<(), Error> {
+        self.criteria.validate()?;
         for (number, robot) in self.robots.iter().enumerate() {
             let at = |key: &str| format!("robots[{number}].{key}");
             if self.robots[..number]

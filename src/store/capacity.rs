@@ -104,7 +104,7 @@ pub struct Point {
 impl Stored for CapacityFile {
     const FORMAT: (&'static str, u32) = (FORMAT, FORMAT_VERSION);
 
-    fn check(&self) -> Result<(), Error> {
+    fn validate(&self) -> Result<(), Error> {
         for (number, task) in self.tasks.iter().enumerate() {
             let at = |key: &str| format!("tasks[{number}].{key}");
             if task.robots == 0 {

@@ -28,8 +28,8 @@ pub struct Checkpoint {
 
 impl Checkpoint {
     /// Checks as strictly as when reading a `run.json`, because the run continues from here.
-    fn check(&self) -> Result<(), Error> {
-        self.run.check().map_err(|error| error.in_place("run"))?;
+    fn validate(&self) -> Result<(), Error> {
+        self.run.validate().map_err(|error| error.in_place("run"))?;
         let RunFile { config, elites, .. } = &self.run;
         let key = |robot: &Robot| config.objective().known_key(&robot.body);
         match elites
@@ -152,7 +152,9 @@ fn read_one(path: &Path) -> Result<Option<Checkpoint>, Error> {
     let name = path.display().to_string();
     // The checksum covers the second line, which holds the text.
     let checkpoint: Checkpoint = reading::read_json(&content, &name)?;
-    checkpoint.check().map_err(|error| error.in_place(&name))?;
+    checkpoint
+        .validate()
+        .map_err(|error| error.in_place(&name))?;
     Ok(Some(checkpoint))
 }
 

@@ -194,8 +194,8 @@ impl RobotReport {
 impl Stored for EvalFile {
     const FORMAT: (&'static str, u32) = (FORMAT, FORMAT_VERSION);
 
-    fn check(&self) -> Result<(), Error> {
-        self.setting.as_ref().map_or(Ok(()), RunSetting::check)?;
+    fn validate(&self) -> Result<(), Error> {
+        self.setting.as_ref().map_or(Ok(()), RunSetting::validate)?;
         if self.images.is_empty() {
             return Err(Error::at_key("images", "expected one or more"));
         }
@@ -251,7 +251,7 @@ impl Stored for EvalFile {
             }
             if let Some(validated) = &robot.validation {
                 validated
-                    .check()
+                    .validate()
                     .map_err(|error| error.in_place(&format!("robots[{number}].validation")))?;
             }
         }

@@ -273,7 +273,7 @@ impl RobotResponse {
 impl Stored for ResponseFile {
     const FORMAT: (&'static str, u32) = (FORMAT, FORMAT_VERSION);
 
-    fn check(&self) -> Result<(), Error> {
+    fn validate(&self) -> Result<(), Error> {
         if self.setting.conditions.is_empty() {
             return Err(Error::at_key("setting.conditions", "expected one or more"));
         }

@@ -25,7 +25,7 @@ pub(crate) trait Stored: DeserializeOwned {
     ///
     /// # Errors
     /// Returns an error that names the key.
-    fn check(&self) -> Result<(), Error>;
+    fn validate(&self) -> Result<(), Error>;
 }
 
 /// Reads a file; `maker` is the command that makes one if there is none.
@@ -50,7 +50,7 @@ pub(crate) fn read<T: Stored>(path: &Path, maker: Option<&'static str>) -> Resul
 /// Returns the errors of [`read`].
 pub(crate) fn parse<T: Stored>(text: &str, name: &str) -> Result<T, Error> {
     let file: T = reading::read_versioned(text, name, T::FORMAT.0, T::FORMAT.1)?;
-    file.check()
+    file.validate()
         .map(|()| file)
         .map_err(|error| error.in_place(name))
 }

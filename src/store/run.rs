@@ -152,7 +152,7 @@ pub struct RunFile {
 impl Stored for RunFile {
     const FORMAT: (&'static str, u32) = (FORMAT, FORMAT_VERSION);
 
-    fn check(&self) -> Result<(), Error> {
+    fn validate(&self) -> Result<(), Error> {
         if self.format != FORMAT || self.format_version > FORMAT_VERSION {
             let text = format!("format: expected {FORMAT}, format_version up to {FORMAT_VERSION}");
             return Err(Error::input(text));

@@ -77,7 +77,7 @@ impl RunSetting {
     }
 
     /// Checks what types cannot: everything here is part of a config, which must be valid.
-    pub(crate) fn check(&self) -> Result<(), Error> {
+    pub(crate) fn validate(&self) -> Result<(), Error> {
         let config = Config {
             seed: 1,
             generations: 1,

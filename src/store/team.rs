@@ -175,7 +175,7 @@ impl Accuracy {
     ///
     /// # Errors
     /// If more are correct, the error names the key.
-    pub(crate) fn check(&self, images: usize) -> Result<(), Error> {
+    pub(crate) fn validate(&self, images: usize) -> Result<(), Error> {
         match self.right <= images {
             true => Ok(()),
             false => Err(Error::at_key(
@@ -189,7 +189,7 @@ impl Accuracy {
 impl Stored for TeamFile {
     const FORMAT: (&'static str, u32) = (FORMAT, FORMAT_VERSION);
 
-    fn check(&self) -> Result<(), Error> {
+    fn validate(&self) -> Result<(), Error> {
         let (classes, images) = (self.classes.len(), self.images.len());
         let refuse =
             |key: &str, expected: String| Err(Error::at_key(key, format!("expected {expected}")));
@@ -244,7 +244,7 @@ impl Stored for TeamFile {
             }
             member
                 .own
-                .check(images)
+                .validate(images)
                 .map_err(|error| error.in_place(&of("own")))?;
         }
         for decoded in self
@@ -254,7 +254,7 @@ impl Stored for TeamFile {
         {
             decoded
                 .accuracy
-                .check(images)
+                .validate(images)
                 .map_err(|error| error.in_place("accuracy"))?;
             if decoded.answers.len() != images {
                 return refuse("answers", format!("one for each of {images} images"));
@@ -297,7 +297,7 @@ impl Stored for TeamFile {
                 ("best_body", best_body),
             ] {
                 accuracy
-                    .check(images)
+                    .validate(images)
                     .map_err(|error| error.in_place(&format!("baselines.{key}")))?;
             }
         }

@@ -106,7 +106,7 @@ impl File {
 impl Stored for File {
     const FORMAT: (&'static str, u32) = FILE;
 
-    fn check(&self) -> Result<(), Error> {
+    fn validate(&self) -> Result<(), Error> {
         match &self.checksum {
             None if self.format_version == 1 => Ok(()),
             Some(checksum) if *checksum == self.sum() => Ok(()),

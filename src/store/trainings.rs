@@ -32,7 +32,7 @@ struct Content {
 impl Stored for Content {
     const FORMAT: (&'static str, u32) = FORMAT;
 
-    fn check(&self) -> Result<(), Error> {
+    fn validate(&self) -> Result<(), Error> {
         for (key, sizes) in &self.trainings {
             for (size, trained) in sizes {
                 if !trained

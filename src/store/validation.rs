@@ -61,7 +61,7 @@ pub(crate) struct Ranking {
 
 impl Validated {
     /// Checks that the counts agree; errors name the key.
-    pub(crate) fn check(&self) -> Result<(), Error> {
+    pub(crate) fn validate(&self) -> Result<(), Error> {
         match self.right <= self.images && self.images > 0 {
             true => Ok(()),
             false => Err(Error::at_key(
@@ -76,7 +76,7 @@ impl Validated {
 fn check_robots(robots: &[Validated]) -> Result<(), Error> {
     for (number, robot) in robots.iter().enumerate() {
         robot
-            .check()
+            .validate()
             .map_err(|error| error.in_place(&format!("robots[{number}]")))?;
         let is_it = |other: &Validated| (&other.id, &other.task) == (&robot.id, &robot.task);
         if robots[..number].iter().any(is_it) {
@@ -90,7 +90,7 @@ fn check_robots(robots: &[Validated]) -> Result<(), Error> {
 impl Stored for ValidationFile {
     const FORMAT: (&'static str, u32) = FORMAT;
 
-    fn check(&self) -> Result<(), Error> {
+    fn validate(&self) -> Result<(), Error> {
         check_robots(&self.robots)?;
         let others = self.others.iter().enumerate();
         for (number, Ranking { robots, .. }) in others {

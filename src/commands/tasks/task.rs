@@ -134,11 +134,11 @@ impl Default for EvalStep {
 
 impl Steps {
     /// Checks what the types cannot; `trains` is true for tasks that train instead of evolve.
-    pub(crate) fn check(&self, trains: bool) -> Result<(), Error> {
+    pub(crate) fn validate(&self, trains: bool) -> Result<(), Error> {
         if let Some(step) = &self.audit {
             selection("audit.robots", &step.robots)?;
             step.criteria
-                .check()
+                .validate()
                 .map_err(|error| error.with_key("audit.criteria"))?;
         }
         let Some(step) = &self.eval else {
