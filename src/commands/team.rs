@@ -16,6 +16,7 @@ use crate::images::held_out::{images_besides, test_images};
 use crate::images::whereabouts::{
     Whereabouts, load_dataset_of, part_of_others, stimuli_of, stimulus_of,
 };
+use crate::robots;
 use crate::robots::selection::{BEST, Chosen, Selection, VALIDATED};
 use crate::search::held_out_run::Trial;
 use crate::search::held_out_run::{CYCLES, HeldOutRun, control_steps, task_of};
@@ -72,7 +73,7 @@ pub(crate) struct TeamOutcome {
 pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutcome, Error> {
     let archives = options.archives.iter();
     let sources = archives
-        .map(|path| StoredRun::read(path))
+        .map(|path| robots::open(path))
         .collect::<Result<Vec<StoredRun>, Error>>()?;
     let Some(first) = sources.first() else {
         let text = "expected the runs whose robots are the team";

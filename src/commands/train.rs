@@ -11,6 +11,7 @@ use crate::images::whereabouts;
 use crate::images::whereabouts::Whereabouts;
 use crate::qd::{Archive, DescriptorSpace, Elite};
 use crate::response::probing::Probing;
+use crate::robots;
 use crate::robots::selection::{Selection, VALIDATED};
 use crate::search::validation;
 use crate::store::folder::{IfExists, RunFolder};
@@ -18,7 +19,6 @@ use crate::store::images::ImageRef;
 use crate::store::metrics::{Metrics, Totals};
 use crate::store::names::{RUN_JSON, TRAINING_JSON};
 use crate::store::run::{Robot, RunFile};
-use crate::store::stored_run::StoredRun;
 use crate::store::training::Origin;
 use crate::store::validation::Validated;
 use crate::task::grouping::Groups;
@@ -75,7 +75,7 @@ pub fn train(options: &TrainOptions, session: &Session) -> Result<TrainOutcome, 
         let error = Error::argument("robots", VALIDATED, text);
         return Err(error.remedy(Remedy::ChooseRobots(Some("top:4"))));
     }
-    let source = StoredRun::read(&options.archive)?;
+    let source = robots::open(&options.archive)?;
     let whereabouts = Whereabouts::given(session.folder())
         .and_of_resumed(options.if_exists, &options.out.join(RUN_JSON))
         .and_of(&options.archive);

@@ -13,6 +13,7 @@ use crate::config::validation::ValidationConfig;
 use crate::data::dataset::{Dataset, Split};
 use crate::images::held_out::images;
 use crate::images::whereabouts::{Whereabouts, load_dataset_of, stimuli_of};
+use crate::robots;
 use crate::robots::selection::{Chosen, Selection, first_physical};
 use crate::search::held_out_run;
 use crate::search::held_out_run::HeldOutRun;
@@ -85,7 +86,7 @@ pub(crate) fn validate(
     options: &ValidationOptions,
     session: &Session,
 ) -> Result<Option<Vec<Validated>>, Error> {
-    let source = StoredRun::read(&options.archive)?;
+    let source = robots::open(&options.archive)?;
     let config = &source.run.config;
     let count = options.best.unwrap_or(config.validation.best);
     let whereabouts = Whereabouts::given(session.folder()).and_of(&source.path);
