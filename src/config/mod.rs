@@ -211,7 +211,7 @@ pub struct DataConfig {
 }
 
 impl DataConfig {
-    /// Returns the settings for another dataset: without folder, file layout and images, if it is.
+    /// Returns the settings for a dataset; another one loses folder, file layout and images.
     #[must_use]
     pub(crate) fn of(&self, dataset: &str) -> Self {
         if dataset == self.dataset {

@@ -129,7 +129,7 @@ impl<'a> Half<'a> {
         Some([half(0)?, half(1)?])
     }
 
-    /// Returns the best design by this half's slopes, and its side: 1 or −1.
+    /// Returns the best design by this half's slopes, and its side: −1 if `right` 1 walks left.
     fn solved(&self, seed: u64, number: u64) -> Solved {
         let Response {
             slopes, intercept, ..

@@ -59,7 +59,7 @@ fn nearest_edge(
     nearest
 }
 
-/// The force on a point that an edge pushes out, without the edge's damping; and its two parts.
+/// The force on a point that an edge pushes out, without damping; its parts act on the edge's ends.
 struct Push {
     on_point: Vector,
     normal_force: f64,
