@@ -10,20 +10,16 @@ use crate::task::grouping::ClassSplit;
 pub(crate) struct LabelledImage<'a> {
     /// H × W in [0, 1].
     pub(crate) stimulus: &'a Grid<f64>,
-    /// Its class.
     pub(crate) class: u8,
 }
 
 /// A classifier by one pixel: above its threshold one group, else the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PixelRule {
-    /// Its row.
     pub(crate) row: usize,
-    /// Its column.
     pub(crate) column: usize,
     /// The threshold, in [0, 1].
     pub(crate) level: f64,
-    /// The answer for pixels above the threshold.
     pub(crate) above: Group,
 }
 
@@ -36,8 +32,7 @@ pub(crate) fn larger_group(split: &ClassSplit, images: &[LabelledImage]) -> f64 
     a.max(images.len() - a) as f64 / images.len().max(1) as f64
 }
 
-/// Returns the pixel and threshold that best separate the groups; the first in reading order wins a
-/// tie. Returns `None` without images.
+/// Returns the pixel and threshold that best separate the groups; the first in reading order wins.
 pub(crate) fn best_pixel(split: &ClassSplit, images: &[LabelledImage]) -> Option<PixelRule> {
     let first = images.first()?.stimulus;
     let total_a = images

@@ -28,14 +28,11 @@ const MOST_PLACES: usize = 50_000_000;
 /// Most images in the rollouts of a page: one of each class, if there are more.
 const MOST_IMAGES: usize = 4;
 
-/// All results of a run.
 #[derive(Clone, Debug)]
 pub(crate) struct Dossier {
-    /// Its run.json.
     pub(crate) path: PathBuf,
     /// Number of earlier runs with its name and seed; `None` if it is the only one.
     pub(crate) namesake: Option<usize>,
-    /// The run.
     pub(crate) run: RunFile,
     /// Its progress; `None` without a metrics.csv.
     pub(crate) progress: Option<Progress>,
@@ -48,11 +45,8 @@ pub(crate) struct Dossier {
 /// Results of tests; `None` for those not done.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Findings {
-    /// From `eval`.
     pub(crate) eval: Option<EvalFile>,
-    /// From `audit`.
     pub(crate) audit: Option<AuditFile>,
-    /// From `capacity`.
     pub(crate) capacity: Option<CapacityFile>,
 }
 
@@ -110,10 +104,8 @@ pub(crate) struct Team {
     pub(crate) together: Vec<LabelledStimulus>,
 }
 
-/// All data of a page.
 #[derive(Clone, Debug)]
 pub(crate) struct Gathered {
-    /// The runs.
     pub(crate) runs: Vec<Dossier>,
     /// Results of several runs together, from above their folders.
     pub(crate) together: Findings,
@@ -123,9 +115,6 @@ pub(crate) struct Gathered {
 
 /// Reads runs and the results beside them; unreadable results go to `warn`. Without
 /// `with_rollouts`, no images are needed.
-///
-/// # Errors
-/// Returns an error if a run or its images are wrong.
 pub(crate) fn gather(
     archives: &[PathBuf],
     data: Option<&Path>,
@@ -344,8 +333,7 @@ fn images(
     shown.iter().map(one).collect()
 }
 
-/// Whether a simulation under this number of images can be recorded: a recording holds every point
-/// at every moment.
+/// Checks that a recording, which holds every point at every moment, is short enough.
 pub(crate) fn check_length(config: &Config, images: usize) -> Result<(), Error> {
     let points = (config.body.height + 1) * (config.body.width + 1);
     let most = MOST_PLACES / points / images.max(1);
@@ -415,7 +403,6 @@ impl Dossier {
     }
 }
 
-/// Counts the voxels in which two bodies of one size differ.
 fn distance(a: &Robot, b: &Robot) -> usize {
     a.body
         .voxels()

@@ -8,12 +8,9 @@ use crate::task::grouping::groups_text;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// How a run came along.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Progress {
-    /// Name of the run.
     pub(crate) run: String,
-    /// Its seed.
     pub(crate) seed: u64,
     /// What its fitness is measured in.
     pub(crate) unit: Option<&'static str>,
@@ -30,7 +27,6 @@ pub(crate) struct SettingsGroup<'a> {
     pub(crate) label: String,
     /// Its value of each key in which groups differ; none where it has no such key.
     pub(crate) values: Vec<Option<String>>,
-    /// Its runs.
     pub(crate) runs: Vec<&'a Progress>,
 }
 
@@ -105,10 +101,7 @@ fn spoken(value: &toml::Value) -> String {
 }
 
 impl Progress {
-    /// Reads the metrics.csv beside a run.json.
-    ///
-    /// # Errors
-    /// What is missing or wrong, with its line.
+    /// Reads the metrics.csv beside a run.json; an error names the line.
     pub(crate) fn of(run: &RunFile, archive: &Path) -> Result<Self, Error> {
         let moments = moments_of(run, archive)?;
         let unit = run.fitness().unit();

@@ -1,9 +1,7 @@
 //! The paper's published results, for comparison with ours.
 
-/// A row of the paper's table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PaperRow {
-    /// The task.
     pub(crate) task: &'static str,
     /// Mean accuracy of ten robots on held-out images \[%\] (section "Generalization test").
     pub(crate) accuracy: f64,

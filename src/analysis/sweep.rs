@@ -12,9 +12,7 @@ use std::path::PathBuf;
 pub(crate) struct SweepRow {
     /// The task's number in the sweep, from 1.
     pub(crate) number: usize,
-    /// Its name.
     pub(crate) name: String,
-    /// How far it is.
     pub(crate) state: TaskState,
     /// Varied keys with its values.
     pub(crate) varied: Vec<(String, String)>,
@@ -22,12 +20,10 @@ pub(crate) struct SweepRow {
     pub(crate) run: Option<RunRow>,
 }
 
-/// What a run found on one task.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RunRow {
     /// What is told apart, as "0|1".
     pub(crate) recognises: String,
-    /// Generations done.
     pub(crate) generations: u64,
     /// Wall-clock time of the run \[s\].
     pub(crate) seconds: f64,
@@ -43,24 +39,18 @@ pub(crate) struct RunRow {
     pub(crate) tested: Option<Tested>,
 }
 
-/// A test.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Tested {
-    /// Which images.
     pub(crate) split: HeldOut,
-    /// How many.
     pub(crate) images: usize,
-    /// Robots.
     pub(crate) robots: usize,
     /// Their mean accuracy, from 0 to 1.
     pub(crate) accuracy: f64,
     /// Its 95 % interval: of one robot over images, of several over robots.
     pub(crate) interval: Option<[f64; 2]>,
-    /// Their mean balanced accuracy.
     pub(crate) balanced: f64,
 }
 
-/// Everything that is collected.
 #[derive(Clone, Debug)]
 pub(crate) struct Collected {
     /// A row per task and what its robots tell apart.
@@ -92,7 +82,6 @@ pub(crate) struct Columns<'a> {
 }
 
 impl<'a> Columns<'a> {
-    /// Their names, in order.
     const NAMES: [&'static str; 15] = [
         "recognises",
         "generations",
@@ -111,7 +100,6 @@ impl<'a> Columns<'a> {
         "balanced_accuracy",
     ];
 
-    /// Of a row.
     pub(crate) fn of(row: &'a SweepRow) -> Self {
         let Some(run) = &row.run else {
             return Columns::default();

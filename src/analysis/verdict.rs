@@ -51,8 +51,7 @@ impl<'a> Behaviour<'a> {
         let is_right =
             |&image: &usize| towards(rightward[image], plain[image]) > criteria.threshold;
         let answered: Vec<usize> = asked.iter().copied().filter(is_right).collect();
-        // A robot with many wrong answers is still a walker if it walks; tests measure its
-        // accuracy.
+        // Wrong answers do not matter to a walker: tests measure its accuracy.
         let walks = |&&image: &&usize| Direction::of(plain[image], criteria.threshold).is_some();
         let walked = asked.iter().filter(walks).count();
         let groups = [Group::A, Group::B]
@@ -98,12 +97,10 @@ impl<'a> Behaviour<'a> {
         }
     }
 
-    /// Returns true if the robot can be audited.
     pub(crate) fn is_walker(&self) -> bool {
         self.flaw.is_none()
     }
 
-    /// Compares a perturbed rollout with the unperturbed one.
     pub(crate) fn compare(
         &self,
         name: String,
@@ -137,7 +134,6 @@ impl<'a> Behaviour<'a> {
         }
     }
 
-    /// Returns the verdict and its reason.
     pub(crate) fn judge(&self, rollouts: &[PerturbedRollout]) -> (Verdict, String) {
         if let Some(flaw) = &self.flaw {
             return (Verdict::NotAWalker, flaw.clone());
@@ -195,7 +191,6 @@ impl<'a> Behaviour<'a> {
     }
 }
 
-/// Returns the displacement in the correct direction.
 fn towards(rightward: Option<bool>, displacement: f64) -> f64 {
     match rightward {
         Some(true) => displacement,

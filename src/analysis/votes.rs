@@ -87,7 +87,6 @@ impl Ballot {
 pub(crate) struct Tally {
     /// Displacement of each robot so far \[voxel lengths\]; `None` if it became unstable.
     pub(crate) moved: Vec<Option<f64>>,
-    /// Votes and sums of walks, for every class.
     #[serde(flatten)]
     pub(crate) ballot: Ballot,
     /// The class with most votes; `None` while there is no vote.
@@ -95,7 +94,6 @@ pub(crate) struct Tally {
 }
 
 impl Tally {
-    /// Counts walks; threshold and clip are those of [`Ballot::count`].
     pub(crate) fn of(
         classes: &[u8],
         judges: &[&Readout],
@@ -115,7 +113,6 @@ impl Tally {
 }
 
 impl Accuracy {
-    /// Computes the accuracy from pairs of an answer and the correct one.
     pub(crate) fn of<T: PartialEq>(answers: impl IntoIterator<Item = (T, T)>) -> Self {
         let (mut right, mut all) = (0, 0);
         for (answer, expected) in answers {

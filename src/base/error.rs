@@ -28,7 +28,6 @@ pub enum ErrorKind {
 }
 
 impl ErrorKind {
-    /// Returns the process's exit code.
     pub(crate) fn exit_code(self) -> u8 {
         match self {
             ErrorKind::Other => 1,
@@ -84,12 +83,10 @@ impl Error {
         Error::new(ErrorKind::Input, message)
     }
 
-    /// Reports that a key of a config has an invalid value.
     pub(crate) fn value(key: &str, found: impl fmt::Display, expected: &str) -> Self {
         Error::input(format!("{key} = {found}: expected {expected}")).with_key(key)
     }
 
-    /// Reports a problem with a key of a config.
     pub(crate) fn at_key(key: &str, text: impl fmt::Display) -> Self {
         Error::input(format!("{key}: {text}")).with_key(key)
     }
@@ -107,17 +104,14 @@ impl Error {
         }
     }
 
-    /// Reports that the command line is wrong.
     pub(crate) fn usage(message: String) -> Self {
         Error::new(ErrorKind::Usage, message)
     }
 
-    /// Reports that something is in the way.
     pub(crate) fn occupied(message: String) -> Self {
         Error::new(ErrorKind::Occupied, message)
     }
 
-    /// Reports a failure of another kind.
     pub(crate) fn other(message: String) -> Self {
         Error::new(ErrorKind::Other, message)
     }
@@ -127,12 +121,10 @@ impl Error {
         Error::new(ErrorKind::Unstable, message)
     }
 
-    /// Reports that a signal stopped the command.
     pub(crate) fn stopped(message: String) -> Self {
         Error::new(ErrorKind::Stopped, message)
     }
 
-    /// Reports that a file from the user cannot be read.
     pub(crate) fn reading(path: &Path, error: &io::Error) -> Self {
         Error::input(format!("{}: cannot be read: {error}", path.display()))
     }
@@ -147,7 +139,6 @@ impl Error {
         }
     }
 
-    /// Reports that a file is not written because its folder is no longer this process's.
     fn lost(path: &Path, lost: &Lost) -> Self {
         let advice = match lost {
             Lost::Taken { .. } => "let that one end, or start this command again in another folder",
@@ -159,8 +150,7 @@ impl Error {
         Error::new(ErrorKind::Lost, text).advice(advice)
     }
 
-    /// Reports that a file cannot be written; adds remedies if there is no room for it or the lock
-    /// of its folder is lost.
+    /// Adds remedies if there is no room for the file or the lock of its folder is lost.
     pub(crate) fn writing(path: &Path, error: &io::Error) -> Self {
         // A folder removed a moment ago fails in other ways, too.
         let now = ownership::check(path).err();
@@ -187,7 +177,6 @@ impl Error {
         }
     }
 
-    /// Adds a remedy after the existing ones.
     #[must_use]
     pub(crate) fn remedy(mut self, remedy: Remedy) -> Self {
         self.remedies.push(match remedy {
@@ -212,7 +201,6 @@ impl Error {
         }
     }
 
-    /// Names the key that the error is about.
     #[must_use]
     pub(crate) fn with_key(self, key: &str) -> Self {
         Error {
@@ -236,8 +224,7 @@ impl Error {
     }
 }
 
-/// Returns true if there is no room: on the disk, in the user's quota or within the file size
-/// limit.
+/// True if the disk, the user's quota or the file size limit leaves no room.
 pub(crate) fn is_full(error: &io::Error) -> bool {
     use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
     matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)

@@ -18,9 +18,6 @@ const MOST_TEXT: u64 = 256 << 20;
 
 /// Opens a file of a run or a dataset. Refuses a pipe, a socket or a device at once: anybody can
 /// put one there, and it could block for ever. (A folder fails when read.)
-///
-/// # Errors
-/// Returns the system's error, or one that names the kind if it is no regular file.
 pub(crate) fn open_file(path: &Path) -> io::Result<File> {
     let mut options = File::options();
     options.read(true);
@@ -50,36 +47,22 @@ fn regular(found: &Metadata) -> io::Result<()> {
 
 /// Checks that [`open_file`] would open a file, or that there is none. Call it before writing:
 /// opening a pipe to write could block for ever, too.
-///
-/// # Errors
-/// Returns an error if something else is in its place.
 pub(crate) fn check_file(path: &Path) -> io::Result<()> {
     std::fs::metadata(path).map_or(Ok(()), |found| regular(&found))
 }
 
-/// Reads a file of a run or a dataset to its end.
-///
-/// # Errors
-/// As [`open_file`].
 pub(crate) fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open_file(path)?.read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
-/// Reads a text file of a run or a dataset.
-///
-/// # Errors
-/// As [`open_file`] and [`read_limited`].
 pub(crate) fn read_text(path: &Path) -> io::Result<String> {
     read_limited(open_file(path)?)
 }
 
-/// Reads a text that the user wrote and named. It may come through a pipe, as from `<(…)` of a
-/// shell. An endless source, such as a device, is refused before it fills the memory.
-///
-/// # Errors
-/// As [`read_text`].
+/// Reads a text that the user named. It may come through a pipe, as from `<(…)` of a shell. An
+/// endless source, such as a device, is refused before it fills the memory.
 pub(crate) fn read_given(path: &Path) -> io::Result<String> {
     match std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
         true => read_limited(File::open(path)?),
@@ -87,10 +70,7 @@ pub(crate) fn read_given(path: &Path) -> io::Result<String> {
     }
 }
 
-/// Reads a text to its end: UTF-8, or UTF-16 with a byte order mark, as PowerShell's `>` writes it.
-///
-/// # Errors
-/// Returns the system's error, or its own if it is no such text or exceeds 256 megabytes.
+/// Reads a text of up to 256 MB: UTF-8, or UTF-16 with a byte order mark (as PowerShell's `>`).
 pub(crate) fn read_limited(source: impl Read) -> io::Result<String> {
     let mut bytes = Vec::new();
     let read = source.take(MOST_TEXT + 1).read_to_end(&mut bytes)?;
@@ -127,18 +107,11 @@ pub(crate) fn home_expanded(path: &Path) -> PathBuf {
 /// Writes a file as a whole or not at all: to a temporary name in the same folder, synced, then
 /// renamed. A symbolic link stays and its target is written. Anything but a regular file
 /// (`/dev/stdout`, a pipe) is written to directly. Removes leftovers of killed writers.
-///
-/// # Errors
-/// Returns the system's error, for example if the folder does not exist, or [`ownership::Lost`].
-/// The file then stays as it was.
 pub(crate) fn write_atomically(path: &Path, content: &[u8]) -> io::Result<()> {
     write_whole(path, |file| file.write_all(content))
 }
 
 /// Acts as [`write_atomically`], but `write` writes the content, which need not be in memory.
-///
-/// # Errors
-/// As [`write_atomically`]; also the error of `write`.
 pub(crate) fn write_whole(
     path: &Path,
     write: impl FnOnce(&mut File) -> io::Result<()>,
@@ -163,7 +136,6 @@ pub(crate) fn write_whole(
     sync_folder(folder)
 }
 
-/// Makes a temporary file beside a file.
 fn temporary(path: &Path) -> io::Result<tempfile::NamedTempFile<File>> {
     let mut prefix = OsString::from(TEMPORARY[0]);
     prefix.extend([inner_name(path), OsStr::new(".")]);
@@ -183,7 +155,6 @@ fn inner_name(path: &Path) -> &OsStr {
         .unwrap_or_default()
 }
 
-/// Returns the name of the file that a temporary name belongs to.
 fn temporary_of(name: &str) -> Option<&str> {
     let [begin, end] = TEMPORARY;
     let inner = name.strip_prefix(begin)?.strip_suffix(end)?;
@@ -205,8 +176,7 @@ fn remove_left_behind(path: &Path) {
     }
 }
 
-/// Returns true if the writer of a temporary file has ended, since a live one holds its lock. A new
-/// file may not be locked yet.
+/// True if a temporary file's writer has ended: a live one holds its lock, unless it is quite new.
 fn is_left_behind(entry: &DirEntry) -> io::Result<bool> {
     let found = entry.metadata()?;
     let age = SystemTime::now()
@@ -226,9 +196,6 @@ fn led_to(path: &Path) -> PathBuf {
 }
 
 /// Checks that [`write_atomically`] could write here; leaves nothing behind.
-///
-/// # Errors
-/// Returns the system's error, for example if the folder does not exist.
 pub(crate) fn check_writable(path: &Path) -> io::Result<()> {
     match std::fs::metadata(path) {
         Ok(found) if found.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
@@ -237,11 +204,7 @@ pub(crate) fn check_writable(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Removes temporary files with these names that a killed process left in a folder. Only their sole
-/// writer may call this.
-///
-/// # Errors
-/// Returns the system's error.
+/// Removes temporary files of these names in a folder. Only their sole writer may call this.
 pub(crate) fn remove_half_written(folder: &Path, names: &[&str]) -> io::Result<()> {
     for entry in std::fs::read_dir(folder)? {
         let entry = entry?;
@@ -255,9 +218,6 @@ pub(crate) fn remove_half_written(folder: &Path, names: &[&str]) -> io::Result<(
 }
 
 /// Makes a rename in a folder durable. (Only Unix can sync a folder.)
-///
-/// # Errors
-/// Returns the system's error.
 pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
     if cfg!(unix) {
         File::open(folder)?.sync_all()

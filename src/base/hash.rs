@@ -7,15 +7,13 @@ pub fn sha256_hex(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }
 
-/// Returns the first 16 bytes of SHA-256: enough that two different contents never collide in
-/// practice (among 10⁶ contents the chance is below 10⁻²⁶).
+/// Returns the first 16 bytes of SHA-256: any two of 10⁶ contents collide with chance below 10⁻²⁶.
 pub(crate) fn content_key(bytes: &[u8]) -> [u8; 16] {
     let mut key = [0; 16];
     key.copy_from_slice(&Sha256::digest(bytes)[..16]);
     key
 }
 
-/// Writes bytes as lower-case hexadecimal.
 pub(crate) fn hex(bytes: &[u8]) -> String {
     use std::fmt::Write;
     bytes.iter().fold(String::new(), |mut text, b| {

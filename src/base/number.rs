@@ -1,6 +1,5 @@
 //! Numbers for people: tables, labels and messages all format theirs here.
 
-/// Returns true for 0, which files leave out.
 pub(crate) fn is_zero(number: &usize) -> bool {
     *number == 0
 }

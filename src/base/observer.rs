@@ -23,7 +23,6 @@ pub trait Observer: Sync {
     fn failed(&self, _error: &Error, _then: &str) {}
 }
 
-/// Ignores everything.
 impl Observer for () {}
 
 /// Work that is counted.
@@ -40,7 +39,6 @@ pub struct Work {
 }
 
 impl Work {
-    /// Makes work of which nothing was done before.
     pub(crate) fn new(label: String, total: u64, unit: &'static str) -> Self {
         Work {
             label,
@@ -57,13 +55,11 @@ pub struct Generation {
     /// Generations done.
     #[serde(rename = "generation")]
     pub done: u64,
-    /// Generations in all.
     #[serde(rename = "generations")]
     pub(crate) total: u64,
     /// Best fitness so far, in the fitness's unit; none if no robot has one.
     pub(crate) best: Option<f64>,
     /// Fraction of the possible cells that are filled, from 0 to 1.
     pub(crate) coverage: f64,
-    /// Evaluations so far.
     pub(crate) evaluations: u64,
 }

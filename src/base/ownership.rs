@@ -9,12 +9,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// A lock on a folder that this process no longer holds.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Lost {
-    /// Another process holds it.
     #[error("{holder} has taken over {}", lock.display())]
     Taken {
         /// The lock file.
         lock: PathBuf,
-        /// The name of that process.
         holder: String,
     },
     /// The lock file was removed or emptied.
@@ -32,7 +30,6 @@ impl From<Lost> for io::Error {
 }
 
 impl Lost {
-    /// Returns the loss that caused an error of a write, if one did.
     pub(crate) fn of(error: &io::Error) -> Option<&Self> {
         error.get_ref()?.downcast_ref()
     }
@@ -82,9 +79,6 @@ impl Drop for Ownership {
 }
 
 /// Checks that this process may write a file: it has not lost its lock on the file's folder.
-///
-/// # Errors
-/// Returns [`Lost`], or the system's error if the lock cannot be read.
 pub(crate) fn check(file: &Path) -> io::Result<()> {
     if claims().is_empty() {
         return Ok(());
@@ -99,7 +93,6 @@ pub(crate) fn check(file: &Path) -> io::Result<()> {
     looks.iter().try_for_each(|look| look())
 }
 
-/// Returns the folder of a file.
 pub(super) fn folder_of(path: &Path) -> &Path {
     path.parent()
         .filter(|folder| !folder.as_os_str().is_empty())

@@ -16,7 +16,6 @@ const NUMBER: RangeInclusive<f64> = -MOST..=MOST;
 
 /// A value that holds numbers: one, several or none.
 pub(crate) trait Numbers {
-    /// Returns the first number outside a range.
     fn outside(&self, range: &RangeInclusive<f64>) -> Option<f64>;
 }
 
@@ -64,14 +63,12 @@ pub(crate) fn size<'de, D: Deserializer<'de>, T: Numbers + Deserialize<'de>>(
     read(from, SIZE)
 }
 
-/// Reads numbers of either sign.
 pub(crate) fn number<'de, D: Deserializer<'de>, T: Numbers + Deserialize<'de>>(
     from: D,
 ) -> Result<T, D::Error> {
     read(from, NUMBER)
 }
 
-/// Reads numbers of at most 1.
 pub(crate) fn at_most_one<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     read(from, -MOST..=1.0)
 }
@@ -115,10 +112,7 @@ fn read<'de, D: Deserializer<'de>, T: Numbers + Deserialize<'de>>(
     }
 }
 
-/// Checks a number whose type belongs to another crate.
-///
-/// # Errors
-/// Returns an error that names `key` if the number is larger than any that a simulation gives.
+/// Checks a number whose type belongs to another crate; the error names `key`.
 pub(crate) fn check(key: &str, number: f64) -> Result<(), Error> {
     match number.outside(&NUMBER) {
         None => Ok(()),

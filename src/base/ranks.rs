@@ -26,7 +26,6 @@ pub struct Guard {
 const LAUNCHED: [&str; 2] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"];
 
 impl Ranks {
-    /// A process by itself.
     pub(crate) const ALONE: Ranks = Ranks { rank: 0, size: 1 };
 
     /// Joins the ranks that this process was started with; without MPI it is alone.
@@ -46,7 +45,6 @@ impl Ranks {
         self.rank == 0
     }
 
-    /// Returns the number of this rank, from 0.
     pub(crate) fn rank(self) -> usize {
         self.rank
     }

@@ -55,7 +55,6 @@ pub enum Remedy {
 }
 
 impl Remedy {
-    /// Makes advice in plain words.
     pub(crate) fn advice(text: impl Into<String>) -> Self {
         Remedy::Advice(text.into())
     }
@@ -72,19 +71,15 @@ pub struct Invocation {
     pub(crate) options: Vec<(&'static str, Option<Value>)>,
 }
 
-/// The value of an option.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Value {
-    /// A word of any characters.
     Word(String),
-    /// A path.
     Path(PathBuf),
     /// A placeholder that the user fills in.
     Placeholder(&'static str),
 }
 
 impl Invocation {
-    /// Makes a command without options.
     pub(crate) fn new(command: &'static str) -> Self {
         Invocation {
             command,
@@ -93,21 +88,18 @@ impl Invocation {
         }
     }
 
-    /// Adds a value without an option.
     #[must_use]
     pub(crate) fn value(mut self, value: impl Into<Value>) -> Self {
         self.values.push(value.into());
         self
     }
 
-    /// Adds an option with its value.
     #[must_use]
     pub(crate) fn option(mut self, name: &'static str, value: impl Into<Value>) -> Self {
         self.options.push((name, Some(value.into())));
         self
     }
 
-    /// Adds a switch, if `is_on`.
     #[must_use]
     pub(crate) fn switch(mut self, name: &'static str, is_on: bool) -> Self {
         if is_on {

@@ -13,7 +13,6 @@ use std::sync::atomic::AtomicBool;
 pub struct Session<'a> {
     /// Number of threads; `None`: one per core. Results do not depend on it.
     pub(crate) threads: Option<usize>,
-    /// Processes that share the work, each with the same options.
     pub(crate) ranks: Ranks,
     /// Stops the command when set, by another thread or a signal; finished work is kept.
     pub(crate) stop: &'a AtomicBool,
@@ -55,7 +54,6 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Returns a session whose work several processes share.
     #[must_use]
     pub(crate) fn ranks(self, ranks: Ranks) -> Self {
         Session { ranks, ..self }
@@ -67,7 +65,6 @@ impl<'a> Session<'a> {
         Session { data, ..self }
     }
 
-    /// Returns a session with another observer.
     pub(crate) fn watched<'b>(&self, observer: &'b dyn Observer) -> Session<'b>
     where
         'a: 'b,
@@ -78,15 +75,11 @@ impl<'a> Session<'a> {
             .data(self.data.clone())
     }
 
-    /// Returns the images' folder that the user names.
     pub(crate) fn folder(&self) -> Option<&Path> {
         self.data.as_deref()
     }
 
     /// Returns the pool of threads, which starts at the first call.
-    ///
-    /// # Errors
-    /// Returns an error if the system cannot start the threads.
     pub(crate) fn pool(&self) -> Result<&rayon::ThreadPool, Error> {
         if let Some(pool) = self.pool.get() {
             return Ok(pool);
@@ -95,10 +88,6 @@ impl<'a> Session<'a> {
         Ok(self.pool.get_or_init(|| pool))
     }
 
-    /// Checks that the session has not been stopped.
-    ///
-    /// # Errors
-    /// Returns [`Stopped`] if it has.
     pub(crate) fn check(&self) -> Result<(), Stopped> {
         check(self.stop)
     }

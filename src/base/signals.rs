@@ -61,9 +61,6 @@ pub(crate) fn heed_file_limit() {
 /// Returns a flag that SIGINT, SIGTERM, SIGUSR1 and SIGHUP set; a second SIGINT ends the process at
 /// once. After the flag is dropped, signals end the process again. An ignored SIGHUP stays ignored,
 /// so `nohup` keeps a process alive.
-///
-/// # Errors
-/// Returns an error if the system does not let signals be handled.
 pub(crate) fn stop_flag() -> Result<StopFlag, Error> {
     let failed =
         |error: std::io::Error| Error::other(format!("signals cannot be handled: {error}"));
@@ -98,7 +95,6 @@ pub(crate) fn stop_flag() -> Result<StopFlag, Error> {
     })
 }
 
-/// Returns the signals that make a command stop.
 fn stopping() -> Vec<i32> {
     let mut signals = vec![SIGINT, SIGTERM];
     #[cfg(unix)]

@@ -26,7 +26,6 @@ pub(crate) fn numbered(name: &str, count: usize) -> impl Iterator<Item = String>
     (0..count).map(move |number| format!("{name}_{number}"))
 }
 
-/// Pads a list with empty fields to the number of columns.
 pub(crate) fn padded(values: &[f64], columns: usize) -> Vec<Option<f64>> {
     (0..columns)
         .map(|column| values.get(column).copied())

@@ -48,7 +48,6 @@ pub(crate) fn counted<N: Display + PartialEq + From<u8>>(
     format!("{count} {word}")
 }
 
-/// Marks the place of a cut.
 const CUT: &str = " … ";
 
 fn written(c: char) -> String {

@@ -9,9 +9,6 @@ use std::thread::{Builder, JoinHandle};
 pub const MOST_THREADS: u16 = 1024;
 
 /// Checks the number of threads that rayon's environment variable asks for.
-///
-/// # Errors
-/// Returns an error if it is more than [`MOST_THREADS`].
 pub(crate) fn check_environment() -> Result<(), Error> {
     const NAME: &str = "RAYON_NUM_THREADS";
     let asked = std::env::var(NAME)
@@ -44,9 +41,6 @@ pub fn pool(threads: Option<usize>) -> Result<rayon::ThreadPool, Error> {
 
 /// Runs work on the current pool, or on a new one if this thread belongs to none; on this thread
 /// alone if there is no room for others.
-///
-/// # Errors
-/// Returns an error if the system has no threads left.
 pub(crate) fn in_pool<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, Error> {
     if rayon::current_thread_index().is_some() {
         return Ok(work());
@@ -61,8 +55,7 @@ pub(crate) fn in_pool<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, Err
     Ok(pool.map_err(none_left)?.install(work))
 }
 
-/// Returns the number of threads that a limit of the address space (`ulimit -v`) has room for, if
-/// there is a limit and the system reports it.
+/// Returns the number of threads that a limit of the address space (`ulimit -v`) has room for.
 fn room() -> Option<usize> {
     // The C library reserves this much for each thread that allocates. If that fails, it tries
     // again at every allocation: drawing a picture takes three times as long.
@@ -76,10 +69,6 @@ fn room() -> Option<usize> {
     Some((limit / EACH).saturating_sub(1))
 }
 
-/// Starts a thread with a name.
-///
-/// # Errors
-/// Returns an error if the system has no threads left.
 pub(crate) fn start<T: Send + 'static>(
     name: &str,
     work: impl FnOnce() -> T + Send + 'static,
@@ -90,10 +79,7 @@ pub(crate) fn start<T: Send + 'static>(
         .map_err(none_left)
 }
 
-/// Runs the same work on this many threads at once, to its end.
-///
-/// # Errors
-/// Returns an error if the system has too few threads left; then nothing is done.
+/// Runs the same work on this many threads at once, to its end; nothing if they cannot start.
 pub(crate) fn at_once(threads: usize, work: impl Fn() + Sync) -> Result<(), Error> {
     // Workers read it only after all of them have started.
     let all_there = RwLock::new(false);

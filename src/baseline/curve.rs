@@ -29,8 +29,7 @@ impl fmt::Display for Crossing {
     }
 }
 
-/// Returns c0, c1, c2 of the least-squares parabola c0 + c1·x + c2·x² through points; `None` for
-/// fewer than three different x.
+/// Returns c0, c1, c2 of the least-squares c0 + c1·x + c2·x²; `None` below three different x.
 pub(crate) fn parabola(points: &[(f64, f64)]) -> Option<[f64; 3]> {
     let mut xs: Vec<f64> = points.iter().map(|point| point.0).collect();
     xs.sort_by(f64::total_cmp);

@@ -9,8 +9,7 @@ use std::collections::BTreeMap;
 /// A stimulus with its class.
 pub(crate) type LabelledPixels<'a> = (&'a Grid<f64>, u8);
 
-/// Weight of the penalty on the size of the weights, relative to the mean square of a pixel over
-/// the images: enough for pixels that are always dark.
+/// Weight of the penalty on the weights' size, relative to a pixel's mean square over the images.
 const RIDGE: f64 = 1e-3;
 
 /// Sums over the training images of each class: all that least squares need.
@@ -22,7 +21,6 @@ pub(crate) struct PixelMoments {
     by_class: BTreeMap<u8, DMatrix<f64>>,
 }
 
-/// A linear function of the pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Linear {
     weights: DVector<f64>,
@@ -68,8 +66,7 @@ impl PixelMoments {
         }
     }
 
-    /// Returns the linear function closest in square to 1 under images of one group's classes, and
-    /// to −1 under those of the other's; with a small penalty on its weights.
+    /// Returns the linear function nearest to 1 under one group, −1 under the other (squares).
     pub(crate) fn apart(&self, first: &[u8], second: &[u8]) -> Linear {
         let mut square = DMatrix::zeros(self.size, self.size);
         let mut towards = DVector::zeros(self.size);

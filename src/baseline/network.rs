@@ -9,7 +9,6 @@ use nalgebra::{DVector, DVectorView};
 use std::ops::Range;
 
 impl Activation {
-    /// Applies it to each of some numbers.
     fn apply(self, numbers: &mut [f64]) {
         match self {
             Activation::Relu => {
@@ -30,7 +29,6 @@ impl Activation {
         }
     }
 
-    /// Returns the derivative at the point where the activation has this value.
     #[inline]
     fn slope(self, value: f64) -> f64 {
         match self {
@@ -55,7 +53,6 @@ impl Pooling {
 /// Shape of a network: all that determines it besides its parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Shape {
-    /// Its kind.
     pub(crate) kind: NetworkKind,
     /// Number of hidden neurons or kernels, 1 or more.
     pub(crate) size: usize,
@@ -63,9 +60,7 @@ pub(crate) struct Shape {
     pub(crate) image: (usize, usize),
     /// Side of a convolution's kernels, at most the image's.
     pub(crate) kernel: usize,
-    /// The function that follows the hidden layer.
     pub(crate) activation: Activation,
-    /// Reduction of a convolution's maps.
     pub(crate) pooling: Pooling,
 }
 
@@ -177,7 +172,6 @@ impl Patches {
     }
 }
 
-/// A network with two outputs.
 #[derive(Clone, Debug)]
 pub(crate) struct Network {
     shape: Shape,
@@ -189,8 +183,7 @@ pub(crate) struct Network {
 }
 
 impl Network {
-    /// Makes a network with random parameters: uniform within ±1/√(inputs of a unit), as PyTorch
-    /// initialises such layers.
+    /// Makes a network with parameters uniform within ±1/√(inputs of a unit), as in PyTorch.
     pub(crate) fn new(shape: Shape, rng: &mut Stream) -> Self {
         let [hidden, biases, weights, output_biases] = shape.layout();
         let (size, features) = (shape.size, shape.features());
@@ -220,12 +213,10 @@ impl Network {
         }
     }
 
-    /// Returns the trained parameters.
     pub(crate) fn parameters(&self) -> &DVector<f64> {
         &self.parameters
     }
 
-    /// Returns the trained parameters, mutably.
     pub(crate) fn parameters_mut(&mut self) -> &mut DVector<f64> {
         &mut self.parameters
     }
@@ -263,8 +254,7 @@ impl Network {
         std::array::from_fn(output)
     }
 
-    /// Adds to `gradient` a loss's derivatives by the parameters, given those by the outputs, for
-    /// the last image of [`forward`](Network::forward).
+    /// Adds to `gradient` a loss's derivatives, given those by the outputs, for the last `forward`.
     pub(crate) fn backward(
         &self,
         image: &Patches,
@@ -320,8 +310,7 @@ impl Network {
     }
 }
 
-// Training spends most of its time in the loops below. They are plain, because the standard
-// library's iterators are not always inlined across the codegen units of a crate.
+// Plain loops: most of the time goes here, and library iterators are not always inlined.
 
 /// Computes units from their biases and the values of pixels; `weights` by pixel, then by unit.
 fn weighted_sums(units: &mut [f64], biases: &[f64], pixels: &[(usize, f64)], weights: &[f64]) {
@@ -396,7 +385,6 @@ fn pool(features: &mut [f64], units: &[f64], pooling: Pooling) {
     }
 }
 
-/// Adds a multiple of some numbers to as many others.
 #[inline]
 fn add_scaled(sums: &mut [f64], factor: f64, terms: &[f64]) {
     let terms = &terms[..sums.len()];

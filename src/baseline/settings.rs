@@ -16,10 +16,8 @@ pub(crate) enum NetworkKind {
 }
 
 impl NetworkKind {
-    /// All kinds.
     pub(crate) const ALL: [NetworkKind; 2] = [NetworkKind::Mlp, NetworkKind::Cnn];
 
-    /// Returns its name in files.
     pub(crate) fn name(self) -> &'static str {
         match self {
             NetworkKind::Mlp => "mlp",
@@ -104,13 +102,10 @@ impl Default for Hyperparameters {
     }
 }
 
-/// The result of a training.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Trained {
     /// Fraction of the test images answered correctly.
     pub(crate) accuracy: f64,
-    /// Epochs trained.
     pub(crate) epochs: usize,
-    /// Number of trained parameters.
     pub(crate) parameters: usize,
 }

@@ -16,27 +16,19 @@ pub(crate) struct Samples {
     shape: Shape,
 }
 
-/// The reason why images make no samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum SamplesError {
-    /// There are no images.
     #[error("expected images, found none")]
     Empty,
-    /// An image has another size than the first.
     #[error("expected images of {} × {} pixels, found {} × {}", first.0, first.1, other.0, other.1)]
     Size {
-        /// Rows and columns of the first image.
         first: (usize, usize),
-        /// Rows and columns of the other.
         other: (usize, usize),
     },
 }
 
 impl Samples {
     /// Prepares images of one size, with values in [0, 1], each with its group (0 or 1).
-    ///
-    /// # Errors
-    /// Returns an error if there are no images, or if they differ in size.
     pub(crate) fn new(
         images: &[(&Grid<f64>, usize)],
         kind: NetworkKind,
@@ -131,10 +123,7 @@ impl Adam {
 }
 
 /// Trains a network of a size on `training`, waits for improvement on `waiting`, and tests it on
-/// `test_set`: samples for networks of one kind.
-///
-/// # Errors
-/// Returns [`Stopped`] if `stop` is set in the meantime; every image checks it.
+/// `test_set`: samples for networks of one kind. Every image checks for a stop.
 pub(crate) fn train(
     size: usize,
     hyper: &Hyperparameters,

@@ -46,9 +46,6 @@ impl Default for Criteria {
 
 impl Criteria {
     /// Reads criteria from TOML (or JSON, if the name ends so); missing keys have their defaults.
-    ///
-    /// # Errors
-    /// Returns an error, with file, line and key, if the criteria are invalid.
     pub(crate) fn load(path: Option<&Path>, overrides: &[String]) -> Result<Self, Error> {
         reading::load(path, overrides, Criteria::validate)
     }

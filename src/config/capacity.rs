@@ -7,10 +7,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// The largest size of a network.
 const MOST: usize = 1000;
 
-/// The maximum number of trainings per size.
 const MOST_TRAININGS: usize = 100_000;
 
 /// The networks of a capacity analysis and their training.
@@ -116,7 +114,6 @@ impl CapacityConfig {
         Ok(())
     }
 
-    /// Returns the hyperparameters of a kind of network.
     pub(crate) fn of(&self, kind: NetworkKind) -> &Hyperparameters {
         match kind {
             NetworkKind::Mlp => &self.mlp,
@@ -124,7 +121,6 @@ impl CapacityConfig {
         }
     }
 
-    /// Returns the sizes to train.
     pub(crate) fn sizes(&self) -> impl Iterator<Item = usize> {
         (self.sizes[0]..=self.sizes[1]).step_by(self.step)
     }

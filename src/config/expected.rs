@@ -20,7 +20,6 @@ pub(super) struct Mismatch {
 }
 
 impl Mismatch {
-    /// Formats the message with its key.
     pub(crate) fn at(&self, key: &str) -> String {
         let Mismatch {
             scalar,
@@ -116,7 +115,6 @@ impl Schema {
         }
     }
 
-    /// Returns the alternatives of a value's schema.
     fn alternatives<'a>(&'a self, schema: &'a Value) -> Vec<&'a Value> {
         if let Some(name) = schema.get("$ref").and_then(Value::as_str) {
             let of_name = name

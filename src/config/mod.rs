@@ -211,8 +211,7 @@ pub struct DataConfig {
 }
 
 impl DataConfig {
-    /// Returns the settings for another dataset, without this one's folder, file layout and images.
-    /// For the same dataset, nothing changes.
+    /// Returns the settings for a dataset; another one loses folder, file layout and images.
     #[must_use]
     pub(crate) fn of(&self, dataset: &str) -> Self {
         if dataset == self.dataset {
@@ -297,9 +296,6 @@ impl Config {
     }
 
     /// Reads a config whose path is relative to a folder.
-    ///
-    /// # Errors
-    /// Returns the errors of [`Config::load`].
     pub(crate) fn load_from(
         folder: &Path,
         name: &str,
@@ -362,8 +358,7 @@ impl Config {
             .expect("every field is a number, text, list or table, which TOML has")
     }
 
-    /// Returns the settings that a generation's results depend on: without the number of
-    /// generations and settings that change no result.
+    /// Returns the settings that a generation's results depend on.
     pub(crate) fn essence(&self) -> Config {
         Config {
             generations: 1,
@@ -390,8 +385,7 @@ impl Config {
         settings
     }
 
-    /// Returns the common config of several robots: the first one's, with the
-    /// [`StimulusParams::together`] of all, or `None` without a config.
+    /// Returns the first config with all [`StimulusParams::together`]; `None` without one.
     pub(crate) fn together<'a>(all: impl IntoIterator<Item = &'a Config> + Clone) -> Option<Self> {
         let stimulus =
             StimulusParams::together(all.clone().into_iter().map(|config| config.stimulus))?;
@@ -423,12 +417,10 @@ impl Config {
         self.task.grouping()
     }
 
-    /// Returns all classes of the task, in its order.
     pub(crate) fn classes(&self) -> Vec<u8> {
         self.task.classes()
     }
 
-    /// Checks what types cannot.
     pub(crate) fn validate(&self) -> Result<(), Error> {
         let refuse =
             |key: &str, found: String, expected: &str| Err(Error::value(key, found, expected));
@@ -564,7 +556,6 @@ impl Config {
         self.evaluation.fitness == Fitness::Response
     }
 
-    /// Returns what evolution maximises.
     pub(crate) fn objective(&self) -> &'static dyn Objective {
         match self.measures_response() {
             true => &GaitResponse,
@@ -572,7 +563,6 @@ impl Config {
         }
     }
 
-    /// Checks the rules of `fitness = "response"`, if it is set.
     pub(crate) fn validate_response(&self) -> Result<(), Error> {
         if self.evaluation.fitness != Fitness::Response {
             return Ok(());

@@ -2,11 +2,8 @@
 
 use serde::de::{Deserialize, Deserializer, Error};
 
-/// Reads a pair, for `deserialize_with`. Serde's reader of arrays leaves a third item to the
-/// format, and TOML ignores it.
-///
-/// # Errors
-/// Returns an error if the list has another length, or an item is invalid.
+/// Reads a pair, for `deserialize_with`: serde leaves a third item to the format, and TOML ignores
+/// it.
 pub(crate) fn read<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
     from: D,
 ) -> Result<[T; 2], D::Error> {
@@ -17,10 +14,6 @@ pub(crate) fn read<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
         .map_err(|_| D::Error::custom(format!("expected a list of two, found {count}")))
 }
 
-/// Reads an optional pair.
-///
-/// # Errors
-/// Returns the errors of [`read`].
 pub(crate) fn read_some<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
     from: D,
 ) -> Result<Option<[T; 2]>, D::Error> {

@@ -77,7 +77,6 @@ pub(crate) fn read<T: Serialize + DeserializeOwned + JsonSchema>(
     }
 }
 
-/// The reason why a file is not read.
 struct Refusal {
     line: Option<usize>,
     /// The path within the file's content, if it has any.
@@ -130,8 +129,7 @@ fn half_a_number(text: &str, span: Option<std::ops::Range<usize>>) -> Option<&'s
     is_half.then_some("expected digits before and after the point of a number, as in 0.5")
 }
 
-/// Returns the key of a table that is given as a list. Serde reads a list as the values of a
-/// table's keys in order, which nobody means by `[[body]]`.
+/// Returns the key of a table given as a list, which serde would read as the values of its keys.
 fn listed<T: Serialize>(given: &Value, settings: &T) -> Option<String> {
     fn within(given: &Value, read: &Value) -> Option<Vec<String>> {
         let keyed = |(key, found): (String, Option<Vec<String>>)| {
@@ -270,8 +268,7 @@ fn line_at(text: &str, span: Option<std::ops::Range<usize>>) -> Option<usize> {
     Some(text.get(..span?.start)?.matches('\n').count() + 1)
 }
 
-/// Adds to an error the place of its key, or of the innermost enclosing table in the text: the file
-/// and, in TOML, the line.
+/// Adds the place of an error's key, or of its innermost table: the file and, in TOML, the line.
 pub(crate) fn placed(error: Error, text: &str, format: Format, name: &str) -> Error {
     let line = error
         .key
@@ -349,7 +346,6 @@ pub(crate) fn changed<T: Serialize + DeserializeOwned + JsonSchema>(
         })
 }
 
-/// Creates settings from their keys.
 fn overridden<T: Serialize + DeserializeOwned + JsonSchema>(root: toml::Value) -> Result<T, Error> {
     let given = serde_json::to_value(&root).ok();
     let settings: T = serde_path_to_error::deserialize(root).map_err(|error| {
@@ -468,7 +464,6 @@ fn is_number(part: &str) -> bool {
     !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit())
 }
 
-/// Checks that settings have a key, which may be at its default and omitted.
 fn is_known<T: JsonSchema>(key: &str) -> Result<(), String> {
     match unknown_part::<T>(key) {
         None => Ok(()),

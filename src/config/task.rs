@@ -25,10 +25,6 @@ pub struct TaskConfig {
 }
 
 impl TaskConfig {
-    /// Returns the tasks.
-    ///
-    /// # Errors
-    /// Returns an error if the section `[task]` defines none.
     pub(crate) fn grouping(&self) -> Result<Grouping, Error> {
         let TaskConfig {
             groups,

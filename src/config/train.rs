@@ -64,12 +64,10 @@ pub(crate) const MOST_RANDOM_IMAGES: usize = 100_000;
 /// The maximum number of windows of a gait: about a minute of a core.
 const MOST_WINDOWS: usize = 10_000;
 
-/// The maximum number of rows by which a start is raised, as in an audit.
 const MOST_ROWS: u32 = 100;
 
 impl TrainConfig {
-    /// Returns the number of windows that are tried: none without rounds, because the robot keeps
-    /// its sensors, which suit its own window.
+    /// Returns the number of windows tried: none without rounds, since the robot keeps its sensors.
     pub(crate) fn windows_tried(&self) -> usize {
         if self.rounds == 0 { 0 } else { self.windows }
     }
@@ -79,7 +77,6 @@ impl TrainConfig {
         *self == TrainConfig::default()
     }
 
-    /// Checks what types cannot.
     pub(crate) fn validate(&self) -> Result<(), Error> {
         let least = [
             ("images_per_class", self.images_per_class, 1),

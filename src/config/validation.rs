@@ -3,10 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The minimum number of validation images.
 pub(crate) const LEAST: usize = 40;
 
-/// The key of the number of images, for messages.
 pub(crate) const IMAGES_KEY: &str = "validation.images";
 
 /// Validation at a run's end: section `[validation]`.

@@ -39,7 +39,6 @@ impl Default for BuiltinDigits {
     }
 }
 
-/// Most images of a class in a split.
 const MAX_PER_CLASS: usize = 1_000_000;
 
 /// The reason why such built-in digits do not exist.
@@ -60,7 +59,6 @@ pub enum BuiltinError {
 }
 
 impl BuiltinDigits {
-    /// Number of rows and of columns of every image.
     pub(crate) const SIDE: usize = pen::SIDE;
 
     /// Checks for at least one class, different digits, and not too many images of each.
@@ -86,7 +84,6 @@ impl BuiltinDigits {
         Ok(())
     }
 
-    /// Returns the number of images of a split.
     pub(crate) fn len(&self, split: Split) -> usize {
         self.classes.len() * self.per_class(split)
     }
@@ -131,8 +128,7 @@ mod tests {
 
     #[test]
     fn drawings_are_stable_across_versions() {
-        // Pinned: if this changes, so do all results on built-in digits. Then raise pen::DRAWING
-        // and say so in the CHANGELOG.
+        // Pinned: if this changes, so do all results. Then raise pen::DRAWING; see CHANGELOG.
         let digits = BuiltinDigits::default();
         let mut bytes = Vec::new();
         for index in 0..200 {

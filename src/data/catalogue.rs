@@ -1,7 +1,6 @@
 //! The datasets that can be downloaded: their addresses, and the checksums of their files.
 
 use crate::data::info::FileInfo;
-/// Datasets that `morphcog data fetch` can download.
 pub(crate) const FETCHABLE: [&str; 2] = ["mnist", "fashion-mnist"];
 
 /// A file to download, as published.
@@ -32,7 +31,6 @@ pub struct Catalogue {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("\"{name}\" cannot be fetched; expected {}", FETCHABLE.join(" or "))]
 pub struct UnknownDataset {
-    /// The name.
     pub(crate) name: String,
 }
 
@@ -70,8 +68,7 @@ const MNIST_UNPACKED: [&str; 4] = [
     "ff7bcfd416de33731a308c3f266cc351222c34898ecbeaf847f06e48f7ec33f2",
 ];
 
-/// SHA-256 of the content of MNIST's training and test split, however it is packed (see
-/// [`Dataset::fingerprint`](crate::data::dataset::Dataset::fingerprint)).
+/// SHA-256 of the content of MNIST's training and test split, however it is packed.
 pub(crate) const MNIST_CONTENT: [&str; 2] = [
     "c5097fdd51cfdbe7695fd9df3612695696864b5c424f58d843ffdc5d335e9914",
     "18489308deedfe2f7bd3a11e599a597126f161d991b1ffcffb71642aa76f7f62",
@@ -141,8 +138,7 @@ impl Catalogue {
     }
 }
 
-/// Recognises the dataset of a split by its fingerprint and files, whatever name it was found
-/// under: MNIST by its content, Fashion-MNIST by its files as published.
+/// Recognises a dataset, whatever its name: MNIST by content, Fashion-MNIST by published files.
 pub(crate) fn known_as(fingerprint: &str, files: &[FileInfo]) -> Option<&'static str> {
     let are_published = |published: &Published| {
         let is_one = |file: &FileInfo| {

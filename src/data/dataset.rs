@@ -125,11 +125,7 @@ impl Dataset {
     }
 
     /// Acts as [`Dataset::load`]; `transpose` says whether rows and columns of the images in the
-    /// files are exchanged. By default those of EMNIST are, which is recognised by its names. (The
-    /// built-in digits have no files.)
-    ///
-    /// # Errors
-    /// As [`Dataset::load`].
+    /// files are exchanged. By default those of EMNIST are, which is recognised by its names.
     pub(crate) fn oriented(
         name: &str,
         given: &[DatasetPlace],
@@ -185,7 +181,6 @@ impl Dataset {
         })
     }
 
-    /// Returns the name of the dataset.
     pub(crate) fn name(&self) -> &str {
         &self.name
     }
@@ -269,7 +264,6 @@ impl Dataset {
         })
     }
 
-    /// Returns the description of the dataset for a run's record.
     pub(crate) fn info(&self) -> DatasetInfo {
         let describe = |(&split, loaded): (&Split, &Loaded)| {
             let [height, width] = self.size(split).expect("the split is loaded");
@@ -313,9 +307,6 @@ impl Dataset {
 
     /// Draws `per_class` different images of each class by seed and returns their indices: those of
     /// `classes[0]`, those of `classes[1]`, … Other classes do not affect the draw of one.
-    ///
-    /// # Errors
-    /// Returns [`DatasetError::NotLoaded`], or [`DatasetError::TooFew`] if images are too few.
     pub(crate) fn draw(
         &self,
         split: Split,

@@ -41,7 +41,6 @@ impl Program {
     /// All programs, the preferred one first.
     pub const ALL: [Program; 2] = [Program::Curl, Program::Wget];
 
-    /// Returns its name as a command.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Program::Curl => "curl",
@@ -60,8 +59,7 @@ impl Program {
         command.status().is_ok()
     }
 
-    /// Returns the command that writes a file to its standard output. Its limits allow for a slow
-    /// line: it gives up only on a mirror that is dead or silent.
+    /// Returns the command that writes a file to its output; only a dead mirror is given up.
     fn command(self, url: &str) -> Command {
         let agent = concat!("morphcog/", env!("CARGO_PKG_VERSION"));
         let mut command = Command::new(self.name());
@@ -154,13 +152,11 @@ pub enum AttemptError {
 /// One failed attempt.
 #[derive(Debug)]
 pub struct Attempt {
-    /// The address tried.
     pub(crate) url: String,
     /// The error.
     pub error: AttemptError,
 }
 
-/// Describes the attempts and their errors, each error only once.
 fn tried(attempts: &[Attempt]) -> String {
     let mut all: Vec<(String, Vec<&str>)> = Vec::new();
     for Attempt { url, error } in attempts {
@@ -257,7 +253,6 @@ pub enum FetchOutcome {
 /// A file that exists and is right.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fetched {
-    /// The file.
     pub(crate) file: PathBuf,
     /// Its origin.
     pub outcome: FetchOutcome,
@@ -362,7 +357,6 @@ pub fn fetch(
     fetched
 }
 
-/// Returns the path of a file in a folder after unpacking.
 fn unpacked(folder: &Path, remote: &RemoteFile) -> Option<PathBuf> {
     remote
         .name
@@ -402,7 +396,6 @@ fn found(folder: &Path, remote: &RemoteFile) -> Result<Option<PathBuf>, FetchErr
     Ok(right)
 }
 
-/// Returns the address of a file on a mirror.
 fn address(mirror: &str, remote: &RemoteFile) -> String {
     format!("{}/{}", mirror.trim_end_matches('/'), remote.name)
 }
@@ -410,7 +403,6 @@ fn address(mirror: &str, remote: &RemoteFile) -> String {
 /// An address and its content, or the failed attempts.
 type Downloaded = Result<(String, Vec<u8>), Vec<Attempt>>;
 
-/// Downloads the file from the first mirror that has it right.
 fn from_any(
     program: Program,
     mirrors: &[String],

@@ -25,8 +25,7 @@ pub(crate) fn published_size(name: &str) -> Option<[usize; 2]> {
 pub struct DatasetPlace {
     /// Origin of the folder in the user's terms: "as given", "MORPHCOG_DATA", `[data] dir`.
     pub(crate) origin: String,
-    /// The folder. If it has a subfolder with the dataset's name, that is used, so one folder can
-    /// hold several datasets.
+    /// The folder, or its subfolder of the dataset's name: one may hold several datasets.
     pub(crate) path: PathBuf,
 }
 
@@ -64,8 +63,7 @@ pub fn places(
     .collect()
 }
 
-/// Returns the folder of a dataset if no place is given, which is also the target of downloads:
-/// `data/<name>`.
+/// Returns the folder of a dataset if no place is given, and of downloads: `data/<name>`.
 pub(crate) fn default_folder(name: &str) -> PathBuf {
     Path::new("data").join(name)
 }
@@ -154,7 +152,6 @@ pub enum FilesError {
 }
 
 impl FilesError {
-    /// Returns the user's alternatives.
     pub(crate) fn remedies(&self) -> &[Remedy] {
         match self {
             FilesError::Name(_) => &[Remedy::NameData],
@@ -167,7 +164,6 @@ impl FilesError {
     }
 }
 
-/// The images of one split and their origin.
 #[derive(Clone, Debug)]
 pub(crate) struct StoredSplit {
     pub(crate) images: IdxImages,
@@ -177,10 +173,6 @@ pub(crate) struct StoredSplit {
     pub(crate) fingerprint: String,
 }
 
-/// Checks that a name can be a dataset's: it must be a folder's.
-///
-/// # Errors
-/// Returns [`FilesError::Name`] otherwise.
 pub(crate) fn check_name(name: &str) -> Result<(), FilesError> {
     let allowed = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
     match name.is_empty() || name.starts_with('.') || !name.chars().all(allowed) {
@@ -212,8 +204,7 @@ pub(crate) fn choose(name: &str, given: &[DatasetPlace]) -> Result<DatasetPlace,
     })
 }
 
-/// Loads the labels and images of one split. `transpose` says whether rows and columns of the
-/// images are exchanged, as in EMNIST's files, which are recognised by their names by default.
+/// Loads one split; `transpose`: are rows and columns exchanged? By default, if EMNIST's.
 pub(crate) fn load(
     name: &str,
     place: &DatasetPlace,
@@ -280,8 +271,7 @@ pub(crate) fn load(
     ))
 }
 
-/// Returns true if images are EMNIST's, which is published with rows and columns exchanged, by the
-/// names of their dataset, file or folder. (A published dataset may be in a folder of any name.)
+/// True if the names of dataset, file or folder are EMNIST's, whose rows and columns are exchanged.
 fn is_emnist(dataset: &str, place: &DatasetPlace, image_file: &Path) -> bool {
     let folder = place
         .path
@@ -309,9 +299,8 @@ fn standard_names(split: Split, content: &str) -> Vec<String> {
 }
 
 /// Finds the file of a split's images or labels: one with a standard name, or else the only one
-/// whose name ends in one (EMNIST's `emnist-digits-train-images-idx3-ubyte.gz`), in upper or lower
-/// case. Several, such as a file and its gzipped copy, must have the same content. Returns the path
-/// and the beginning of the name, up to the content; `beginning` requires one.
+/// whose name ends in one (`emnist-digits-train-…`), in any case. Several, such as a gzipped copy,
+/// must have the same content. Returns path and beginning of the name; `beginning` requires one.
 fn find(
     name: &str,
     place: &DatasetPlace,
@@ -429,7 +418,6 @@ fn file_names(folder: &Path) -> io::Result<BTreeSet<String>> {
     Ok(names)
 }
 
-/// Returns remedies for files that are missing or (`replace`) wrong.
 fn remedies(name: &str, place: &DatasetPlace, replace: bool) -> Vec<Remedy> {
     if !FETCHABLE.contains(&name) {
         let put = Remedy::advice("put its IDX files there");

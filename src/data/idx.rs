@@ -12,8 +12,7 @@ use flate2::read::MultiGzDecoder;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-/// Most bytes of one file, stored or unpacked. A larger file is not a set of images but has a
-/// broken header or is the wrong file. (MNIST: 47 MB; the whole of EMNIST: 0.6 GB.)
+/// Most bytes of one file, stored or unpacked: a larger one is no set of images. (EMNIST: 0.6 GB.)
 pub(crate) const MAX_BYTES: u64 = 1 << 30;
 
 /// Type code of unsigned bytes in a magic number.
@@ -33,14 +32,12 @@ pub(crate) struct IdxImages {
 }
 
 impl IdxImages {
-    /// Returns one image; `None` beyond the last.
     pub(crate) fn image(&self, index: usize) -> Option<Grid<u8>> {
         let first = index.checked_mul(self.height)?;
         let rows = self.pixels.chunks(self.width).skip(first).take(self.height);
         Grid::from_rows(rows.map(<[u8]>::to_vec).collect()).ok()
     }
 
-    /// Exchanges rows and columns of all images.
     #[must_use]
     pub(crate) fn transposed(mut self) -> Self {
         let (height, width) = (self.height, self.width);
@@ -62,10 +59,8 @@ impl IdxImages {
     }
 }
 
-/// The content of a file, and the bytes on disk that it came from.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct IdxFile<T> {
-    /// The decoded content.
     pub(crate) content: T,
     /// Size of the stored file (compressed, if it is), bytes.
     pub(crate) bytes: u64,
@@ -203,9 +198,6 @@ impl IdxError {
 }
 
 /// Reads an IDX3 file of unsigned bytes, raw or gzipped (detected by content, not by name).
-///
-/// # Errors
-/// Returns an [`IdxError`] if the file cannot be read or is anything but exactly such a file.
 pub(crate) fn read_images(file: &Path) -> Result<IdxFile<IdxImages>, IdxError> {
     let stored = read_file(file)?;
     let (sizes, pixels) = decode::<3>(file, &stored, "images", "count, rows, columns")?;
@@ -222,9 +214,6 @@ pub(crate) fn read_images(file: &Path) -> Result<IdxFile<IdxImages>, IdxError> {
 }
 
 /// Reads labels, an IDX1 file of unsigned bytes, raw or gzipped (detected by content, not by name).
-///
-/// # Errors
-/// Returns an [`IdxError`] if the file cannot be read or is anything but exactly such a file.
 pub(crate) fn read_labels(file: &Path) -> Result<IdxFile<Vec<u8>>, IdxError> {
     let stored = read_file(file)?;
     let (_, labels) = decode::<1>(file, &stored, "labels", "count")?;
@@ -282,10 +271,7 @@ fn nowhere(file: &Path, error: io::Error) -> io::Error {
     }
 }
 
-/// Returns the content of a file, unpacked if it is gzipped.
-///
-/// # Errors
-/// Returns an [`IdxError`] if it cannot be read or unpacked, or has more than [`MAX_BYTES`].
+/// Returns the content of a file of at most [`MAX_BYTES`], unpacked if it is gzipped.
 pub(crate) fn unpacked(file: &Path) -> Result<Vec<u8>, IdxError> {
     let stored = read_file(file)?;
     let mut content = Vec::new();
@@ -302,7 +288,6 @@ pub(crate) fn unpacked(file: &Path) -> Result<Vec<u8>, IdxError> {
     }
 }
 
-/// Turns an unpacker's error into one of the file.
 fn unpacking(file: &Path, source: io::Error) -> IdxError {
     let file = file.to_path_buf();
     match source.kind() {

@@ -13,13 +13,11 @@ pub(crate) struct DatasetInfo {
     pub(crate) source: String,
     /// Origin of that folder ("as given", "MORPHCOG_DATA", `[data] dir`, "default"), or "builtin".
     pub(crate) origin: String,
-    /// The splits that were loaded.
     pub(crate) splits: BTreeMap<Split, SplitInfo>,
 }
 
 impl DatasetInfo {
-    /// Lists unintended differences between training and test images: sizes, and classes in one
-    /// only.
+    /// Lists unintended differences of training and test images: sizes, classes in one only.
     pub(crate) fn differences(&self) -> Vec<String> {
         let [Some(train), Some(test)] = Split::ALL.map(|split| self.splits.get(&split)) else {
             return Vec::new();
@@ -52,15 +50,11 @@ impl DatasetInfo {
 /// A run's record of one split.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct SplitInfo {
-    /// Number of images.
     pub(crate) images: usize,
-    /// Rows per image.
     pub(crate) height: usize,
-    /// Columns per image.
     pub(crate) width: usize,
-    /// SHA-256 of the content. For files: of the unpacked image file followed by the unpacked label
-    /// file (whether or not they are gzipped), with the images transposed if they are. For built-in
-    /// digits: of their parameters.
+    /// SHA-256 of the content. For files: of the unpacked image file, then the unpacked label file,
+    /// with the images transposed if they are. For built-in digits: of their parameters.
     pub(crate) fingerprint: String,
     /// True if rows and columns of the images are exchanged in the files.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -71,12 +65,10 @@ pub(crate) struct SplitInfo {
     pub(crate) files: Vec<FileInfo>,
 }
 
-/// A file as found on disk.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct FileInfo {
     /// Name within [`DatasetInfo::source`].
     pub(crate) name: String,
-    /// Size, bytes.
     pub(crate) bytes: u64,
     /// SHA-256 of the file as found (compressed, if it is).
     pub(crate) sha256: String,

@@ -8,7 +8,6 @@ use crate::base::random::Stream;
 use crate::data::strokes::{DIGITS, Place, Variant};
 use std::f64::consts::TAU;
 
-/// Rows and columns of a built-in digit.
 pub(crate) const SIDE: usize = 28;
 
 /// Version of the drawing: changes whenever any pixel of any digit does; part of the fingerprints.

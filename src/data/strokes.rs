@@ -3,7 +3,6 @@
 //! A stroke is a list of places that the pen passes; [`crate::data::pen`] draws a smooth line
 //! through them and varies everything. Coordinates: x to the right, y down, in digit heights.
 
-/// One place on a stroke.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Place {
     /// The line passes smoothly.
@@ -19,7 +18,6 @@ use Place::{Turn, Via};
 pub(crate) struct Variant {
     /// Relative weight among the variants of its digit.
     pub(crate) weight: u32,
-    /// The strokes.
     pub(crate) strokes: &'static [&'static [Place]],
 }
 

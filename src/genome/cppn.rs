@@ -97,7 +97,6 @@ impl Cppn {
             .copied()
     }
 
-    /// Returns all nodes, each after its predecessors.
     pub(crate) fn topological_order(&self) -> Vec<usize> {
         // Kahn's algorithm; nodes on a cycle are never reached.
         let mut waiting_for = vec![0; self.node_count()];
@@ -165,7 +164,6 @@ impl Cppn {
         }
     }
 
-    /// Adds a hidden node and returns its number.
     pub(super) fn add_hidden(&mut self, function: Function) -> usize {
         self.hidden.push(function);
         self.node_count() - 1

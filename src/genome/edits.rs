@@ -17,13 +17,10 @@ use std::collections::BTreeMap;
 )]
 pub(crate) struct Edits(pub(super) BTreeMap<(usize, usize), Material>);
 
-/// The reason why a list is not one of edits.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum EditError {
-    /// A voxel is beyond the largest body.
     #[error("edits: row {0}, column {1}: bodies have at most {MAX_SIDE} rows and columns")]
     Place(usize, usize),
-    /// A voxel has two edits.
     #[error("edits: row {0}, column {1} is there twice")]
     Twice(usize, usize),
 }
@@ -43,7 +40,6 @@ impl Edits {
         }
     }
 
-    /// Returns the network's body with the edits.
     pub(super) fn apply(&self, described: &Body) -> Grid<Material> {
         let voxels = described.voxels();
         Grid::from_fn(voxels.height(), voxels.width(), |row, column| {

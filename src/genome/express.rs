@@ -13,9 +13,6 @@ impl Cppn {
     /// there is only one column or row. The distance to the centre, √(x² + y²), is rescaled
     /// linearly so that its smallest and largest value on the grid are −1 and 1 (0 if it is the
     /// same everywhere). The bias is 1.
-    ///
-    /// # Errors
-    /// Returns a [`BodyError`] if there is no cell, or more than [`MAX_SIDE`] rows or columns.
     pub(crate) fn express(&self, height: usize, width: usize) -> Result<Body, BodyError> {
         if height == 0 || width == 0 {
             return Err(GridError::Empty.into());
@@ -94,7 +91,6 @@ mod tests {
     use super::*;
     use crate::genome::function::Function;
 
-    /// Makes a network with only these edges.
     fn network(hidden: &[Function], edges: &[(usize, usize, f64)]) -> Cppn {
         let mut cppn = Cppn::initial();
         (0..28).for_each(|i| cppn.set_weight(i, 0.0));

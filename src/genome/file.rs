@@ -5,7 +5,6 @@ use crate::genome::function::Function;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Version of the file form.
 pub(super) const VERSION: u32 = 1;
 
 #[derive(Serialize, Deserialize, JsonSchema)]
@@ -21,43 +20,31 @@ pub(super) struct CppnFile {
     edges: Vec<Edge>,
 }
 
-/// The reason why a file does not hold a CPPN.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub(crate) enum CppnError {
-    /// The file has another version of the form.
     #[error(
         "version {0} of the CPPN form is unknown; expected {VERSION} (made by a newer morphcog?)"
     )]
     Version(u32),
-    /// There is not one function per material.
     #[error("outputs: {0} functions, expected {OUTPUTS}, one per material")]
     Outputs(usize),
-    /// There are more hidden nodes than [`MAX_HIDDEN`].
     #[error("hidden: {0} nodes, at most {MAX_HIDDEN} are possible")]
     TooLarge(usize),
-    /// A hidden node squashes.
     #[error("hidden[{0}]: squash is for outputs only")]
     HiddenSquash(usize),
-    /// An edge's end is missing or of the wrong kind.
     #[error(
         "edge {from} → {to}: expected an edge from an input (0–3) or hidden node to an output (4–10) or \
          hidden node; hidden nodes are {FIRST_HIDDEN} … below {nodes}"
     )]
     Ends {
-        /// Source of the edge.
         from: usize,
-        /// Target of the edge.
         to: usize,
-        /// Number of nodes.
         nodes: usize,
     },
-    /// Two edges join the same nodes.
     #[error("edge {0} → {1} is there twice")]
     Duplicate(usize, usize),
-    /// A weight is infinite or NaN.
     #[error("edge {0} → {1}: the weight must be a finite number")]
     Weight(usize, usize),
-    /// The edges form a cycle.
     #[error("the edges form a cycle; a CPPN must be acyclic")]
     Cycle,
 }

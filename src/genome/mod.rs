@@ -36,11 +36,8 @@ pub struct Genome {
 /// The bodies that evolution may use (paper: 14 × 14 voxels, connected, at least three muscles).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BodySpec {
-    /// Rows.
     pub(crate) height: usize,
-    /// Columns.
     pub(crate) width: usize,
-    /// Least number of muscle voxels.
     pub(crate) min_muscles: usize,
 }
 
@@ -91,10 +88,6 @@ impl Genome {
         mutation::mutate(&mut self.cppn, params, rng);
     }
 
-    /// Returns its body, of `height` × `width` voxels.
-    ///
-    /// # Errors
-    /// Returns a [`BodyError`] if the size is impossible for a body.
     pub(crate) fn body(&self, height: usize, width: usize) -> Result<Body, BodyError> {
         let described = self.cppn.express(height, width)?;
         if self.edits.is_empty() {
@@ -156,9 +149,6 @@ impl Genome {
     }
 
     /// Acts as [`Genome::offspring`], unless `stop` is set in the meantime.
-    ///
-    /// # Errors
-    /// Returns [`GenomeError::Stopped`] if it was stopped; otherwise as [`Genome::offspring`].
     pub(crate) fn offspring_unless(
         &self,
         spec: BodySpec,
@@ -230,9 +220,6 @@ impl Genome {
     }
 
     /// Acts as [`Genome::random`], unless `stop` is set in the meantime.
-    ///
-    /// # Errors
-    /// Returns [`GenomeError::Stopped`] if it was stopped; otherwise as [`Genome::offspring`].
     pub(crate) fn random_unless(
         spec: BodySpec,
         params: &MutationParams,

@@ -5,7 +5,6 @@ use crate::genome::cppn::{Cppn, FIRST_HIDDEN, INPUTS, MAX_HIDDEN, OUTPUTS};
 use crate::genome::function::Function;
 use crate::genome::params::MutationParams;
 
-/// One kind of mutation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Mutation {
     /// Splits an edge by a hidden node with a random function: the edge's weight in, weight 1 out.
@@ -15,7 +14,6 @@ pub(crate) enum Mutation {
     RemoveNode,
     /// Adds an edge that closes no cycle, with weight ± [`MutationParams::new_edge_weight`].
     AddEdge,
-    /// Removes an edge.
     RemoveEdge,
     /// Gives a hidden or output node another function.
     ChangeFunction,

@@ -46,9 +46,6 @@ fn most(left: &[Vec<ImageRef>]) -> usize {
 }
 
 /// Returns the number of images to take of each class, at least one; errors name `argument`.
-///
-/// # Errors
-/// Returns an error if a class has too few images.
 fn per_class(
     classes: &[u8],
     left: &[Vec<ImageRef>],
@@ -81,11 +78,8 @@ fn per_class(
     }
 }
 
-/// Checks before a run begins that enough images remain to validate its robots at its end. `before`
-/// holds the images its gaits were trained on; `key` is the config key that sets its own number.
-///
-/// # Errors
-/// Returns an error if a class has too few images.
+/// Checks that enough images remain to validate a run's robots at its end, besides `before`, which
+/// its gaits were trained on; `key` is the config key that sets its own number.
 pub(crate) fn check(
     config: &Config,
     before: &[usize],
@@ -141,9 +135,6 @@ pub fn images(
 }
 
 /// Draws validation images of these classes without those in `besides`; see [`images`].
-///
-/// # Errors
-/// As [`images`].
 pub(crate) fn images_besides(
     besides: &BTreeSet<usize>,
     runs: &[&RunFile],
@@ -189,11 +180,7 @@ pub(crate) fn images_besides(
     Ok(turns.take(count).collect())
 }
 
-/// Returns test images, class by class: all, or an even share drawn of each class; the first
-/// classes get the remainder.
-///
-/// # Errors
-/// Returns an error if a class has too few images.
+/// Returns test images by class: all, or an even share drawn of each; first classes get the rest.
 pub(crate) fn test_images(
     classes: &[u8],
     dataset: &Dataset,

@@ -14,7 +14,6 @@ use std::path::Path;
 /// The training images of a run and their stimuli.
 #[derive(Clone, Debug)]
 pub struct TrainingImages {
-    /// Dataset of the images.
     pub(crate) dataset: DatasetRef,
     /// Images, in the order of a sequential rollout.
     pub(crate) images: Vec<ImageRef>,
@@ -25,10 +24,7 @@ pub struct TrainingImages {
     pub conditions: Vec<Condition>,
 }
 
-/// Returns the number of training images of the class that has fewest.
-///
-/// # Errors
-/// If it is less than `least`, the error names the class and all classes of the dataset.
+/// Returns the number of training images of the scarcest class; an error if below `least`.
 pub(crate) fn scarcest(dataset: &Dataset, classes: &[u8], least: usize) -> Result<usize, Error> {
     let counts = classes
         .iter()
@@ -79,9 +75,6 @@ impl TrainingImages {
     }
 
     /// Returns the training images of a config, at least one of each class of its task.
-    ///
-    /// # Errors
-    /// As [`TrainingImages::load`].
     pub(crate) fn images(config: &Config, dataset: &Dataset) -> Result<Vec<ImageRef>, Error> {
         let refuse = |error: DatasetError| Error::input(format!("data.train_images: {error}"));
         let classes = config.classes();

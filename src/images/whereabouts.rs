@@ -17,7 +17,6 @@ use crate::task::stimulus::{StimulusParams, stimulus};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Name and version of the file's schema.
 const FORMAT: (&str, u32) = ("morphcog-data-folder", 1);
 
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -25,7 +24,6 @@ const FORMAT: (&str, u32) = ("morphcog-data-folder", 1);
 struct DataFolder {
     format: String,
     format_version: u32,
-    /// Name of the dataset.
     dataset: String,
     /// Folder with its files; users may write one relative to the run's folder.
     folder: PathBuf,
@@ -36,7 +34,6 @@ struct DataFolder {
 /// and `data/<name>`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Whereabouts {
-    /// Folder from the command line.
     data: Option<PathBuf>,
     /// Files that may name the folder of a run's images.
     remembered: Vec<PathBuf>,
@@ -111,11 +108,8 @@ impl Whereabouts {
         })
     }
 
-    /// Loads the dataset whose training images have this SHA-256. If only other splits are wanted,
-    /// it is checked by its training images if they exist.
-    ///
-    /// # Errors
-    /// As [`Whereabouts::load`]; also if it is another dataset, whose indices mean other images.
+    /// Loads the dataset whose training images have this SHA-256, since indices mean other images
+    /// elsewhere. If only other splits are wanted, it is checked if its training images exist.
     pub(crate) fn load_of(
         &self,
         train_sha256: &str,
@@ -156,7 +150,6 @@ impl Whereabouts {
     }
 
     /// Returns the folder of the config, or else `data/<name>`, if images are looked for there.
-    /// Returns `None` if the command line or a run names one, it does not exist, or none is needed.
     pub(crate) fn by_default(&self, config: &DataConfig) -> Option<PathBuf> {
         let is_known = self.data.is_some() || self.remembered(&config.dataset).ok()?.0.is_some();
         if config.dataset == BUILTIN || is_known {
@@ -169,8 +162,7 @@ impl Whereabouts {
         folder.is_dir().then_some(folder)
     }
 
-    /// Returns the first remembered folder of a dataset that still exists, and the first that does
-    /// not.
+    /// Returns a dataset's first remembered folder that still exists, and the first that does not.
     fn remembered(
         &self,
         dataset: &str,
@@ -202,9 +194,6 @@ impl Whereabouts {
 }
 
 /// Records the folder of a run's images, unless the program draws them.
-///
-/// # Errors
-/// Returns an error if the file cannot be written.
 pub(crate) fn remember(folder: &RunFolder, dataset: &Dataset) -> Result<(), Error> {
     let path = folder.path().join(DATA_FOLDER);
     let failed = |error: &std::io::Error| Error::writing(&path, error);
@@ -240,9 +229,6 @@ pub fn load_dataset(
 
 /// Loads the dataset that a run was made with, or, without a run, any. If only other splits are
 /// wanted, it is checked by its training images if they exist.
-///
-/// # Errors
-/// As [`load_dataset`]; also if it is another dataset, whose indices mean other images.
 pub(crate) fn load_dataset_of(
     run: Option<&DatasetRef>,
     config: &Config,
@@ -266,8 +252,7 @@ pub(crate) fn say_transposed(dataset: &Dataset, config: &DataConfig, session: &S
     }
 }
 
-/// Returns the image size (height, width) that a run was made with, if known: that of the loaded
-/// dataset if they match, else that of a published dataset called `name`.
+/// Returns a run's image size (height, width): the loaded dataset's, or that published as `name`.
 pub(crate) fn size_of(data: &DatasetRef, name: &str, loaded: &Dataset) -> Option<[usize; 2]> {
     match loaded.fingerprint(Split::Train).as_ref() == Some(&data.train_sha256) {
         true => loaded.size(Split::Train),
@@ -275,8 +260,7 @@ pub(crate) fn size_of(data: &DatasetRef, name: &str, loaded: &Dataset) -> Option
     }
 }
 
-/// Returns a warning if robots that see part of their images get images of another size than they
-/// were made for: margins are counted in pixels.
+/// Warns if robots that see part of images get other sizes: margins are counted in pixels.
 pub(crate) fn part_of_others(
     config: &Config,
     size: Option<[usize; 2]>,
@@ -311,9 +295,6 @@ pub fn stimulus_of(
 }
 
 /// Returns several images as a robot of a config sees them, in their order.
-///
-/// # Errors
-/// As [`stimulus_of`].
 pub(crate) fn stimuli_of(
     config: &Config,
     dataset: &Dataset,
@@ -327,9 +308,6 @@ pub(crate) fn stimuli_of(
 }
 
 /// Returns an image as a robot of this size sees it.
-///
-/// # Errors
-/// Returns an error if the image does not fit the body's size.
 pub(crate) fn stimulus_for(
     &BodyConfig { height, width, .. }: &BodyConfig,
     params: &StimulusParams,

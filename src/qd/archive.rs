@@ -11,7 +11,6 @@ pub(crate) struct Elite<S> {
     pub(crate) cell: usize,
     /// Its fitness, finite.
     pub(crate) objective: f64,
-    /// The solution.
     pub(crate) solution: S,
 }
 
@@ -25,29 +24,23 @@ pub struct Archive<S> {
 /// The outcome of an insertion into an [`Archive`].
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Insertion<S> {
-    /// The cell was empty.
     New,
     /// The solution is strictly fitter than the elite it replaced.
     Improved {
-        /// The replaced elite.
         old: Elite<S>,
     },
     /// The existing elite is as fit or fitter.
     Rejected,
 }
 
-/// The reason why a solution cannot be in an archive.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub(crate) enum ArchiveError {
-    /// A fitness is infinite or NaN.
     #[error("cell {cell}: the objective is {objective}, expected a finite number")]
     Objective {
-        /// Index of the cell.
         cell: usize,
         /// The objective found.
         objective: f64,
     },
-    /// A cell of a file has two elites.
     #[error("cell {0} holds two elites, expected at most one")]
     Occupied(usize),
 }
@@ -70,7 +63,6 @@ pub struct ArchiveStats {
 }
 
 impl<S> Archive<S> {
-    /// Makes an archive without elites.
     pub(crate) fn new() -> Self {
         Archive {
             elites: BTreeMap::new(),
@@ -78,9 +70,6 @@ impl<S> Archive<S> {
     }
 
     /// Puts a solution into its cell if that is empty or its elite is strictly less fit.
-    ///
-    /// # Errors
-    /// Returns [`ArchiveError::Objective`] if the fitness is not finite.
     pub(crate) fn insert(&mut self, new: Elite<S>) -> Result<Insertion<S>, ArchiveError> {
         let Elite {
             cell, objective, ..
@@ -127,17 +116,14 @@ impl<S> Archive<S> {
         objectives.get(count.checked_sub(1)?).copied()
     }
 
-    /// Returns the elite of a cell.
     pub(crate) fn get(&self, cell: usize) -> Option<&Elite<S>> {
         self.elites.get(&cell)
     }
 
-    /// Returns the fitness to beat in a cell.
     pub(crate) fn objective(&self, cell: usize) -> Option<f64> {
         self.get(cell).map(|elite| elite.objective)
     }
 
-    /// Returns the number of elites.
     pub(crate) fn len(&self) -> usize {
         self.elites.len()
     }

@@ -21,7 +21,6 @@ impl DescriptorSpace {
         DescriptorSpace::new(counts.into_iter().chain(task).collect())
     }
 
-    /// Returns the names and numbers of bins of the dimensions.
     pub(crate) fn dimensions(&self) -> &[(String, usize)] {
         &self.dimensions
     }
@@ -31,7 +30,6 @@ impl DescriptorSpace {
         self.dimensions.iter().map(|(_, bins)| bins).product()
     }
 
-    /// Returns the index of the cell with these coordinates, `None` if they are not in the space.
     pub(crate) fn index(&self, coordinates: &[usize]) -> Option<usize> {
         if coordinates.len() != self.dimensions.len() {
             return None;
@@ -42,7 +40,6 @@ impl DescriptorSpace {
         })
     }
 
-    /// Returns the coordinates of a cell, `None` if no cell has this index.
     pub(crate) fn coordinates(&self, index: usize) -> Option<Vec<usize>> {
         if index >= self.len() {
             return None;
@@ -57,10 +54,8 @@ impl DescriptorSpace {
     }
 }
 
-/// Number of bins of each count.
 pub(crate) const COUNT_BINS: usize = 7;
 
-/// Returns the width of a bin of counts on a grid with `area` cells.
 fn bin_width(area: usize) -> usize {
     (area / COUNT_BINS).max(1)
 }

@@ -29,7 +29,6 @@ impl Default for EmitterParams {
     }
 }
 
-/// A solution to be made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Proposal {
     /// Generation, from 0.
@@ -43,19 +42,10 @@ pub(crate) struct Proposal {
 /// Makes solutions. All chance must come from streams of (generation, child) and the run's seed, so
 /// that solutions may be made in any order and on any thread.
 pub(crate) trait Variation<S> {
-    /// The reason why a solution could not be made.
     type Error;
 
-    /// Makes a random individual.
-    ///
-    /// # Errors
-    /// Returns an error if none can be made.
     fn random_immigrant(&self, generation: u64, child: u64) -> Result<S, Self::Error>;
 
-    /// Makes a varied copy of `parent`.
-    ///
-    /// # Errors
-    /// Returns an error if none can be made.
     fn offspring(&self, parent: &S, generation: u64, child: u64) -> Result<S, Self::Error>;
 }
 

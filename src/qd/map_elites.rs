@@ -15,16 +15,13 @@ pub(crate) struct MapElites<S> {
     archive: Archive<S>,
 }
 
-/// A solution and its evaluation.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Evaluated<S> {
     /// Number within the generation.
     pub(crate) child: u64,
-    /// Its cell.
     pub(crate) cell: usize,
     /// Its fitness, finite.
     pub(crate) objective: f64,
-    /// The solution.
     pub(crate) solution: S,
 }
 
@@ -38,25 +35,19 @@ impl<S> MapElites<S> {
         }
     }
 
-    /// Returns the archive of the elites found so far.
     pub(crate) fn archive(&self) -> &Archive<S> {
         &self.archive
     }
 
-    /// Removes elites from the archive; see [`Archive::retain_fittest`].
     pub(crate) fn retain_fittest<K: Ord>(&mut self, count: usize, kind: impl Fn(&S) -> K) {
         self.archive.retain_fittest(count, kind);
     }
 
-    /// Returns the composition of a generation; see [`EmitterParams::ask`].
     pub(crate) fn ask(&self, generation: u64) -> Vec<Proposal> {
         self.params.ask(&self.archive, self.seed, generation)
     }
 
     /// Makes one solution of a generation (a random immigrant if the proposal's cell has no elite).
-    ///
-    /// # Errors
-    /// Returns the variation's error.
     pub(crate) fn make<V: Variation<S>>(
         &self,
         proposal: Proposal,
@@ -75,9 +66,6 @@ impl<S> MapElites<S> {
 
     /// Adds the solutions of a generation to the archive, in the order of their numbers, and
     /// returns the outcome of each. Leave out solutions without fitness (unstable rollouts).
-    ///
-    /// # Errors
-    /// Returns an [`ArchiveError`] if a fitness is not finite; the archive has earlier solutions.
     pub(crate) fn tell(
         &mut self,
         mut generation: Vec<Evaluated<S>>,

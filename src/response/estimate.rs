@@ -16,24 +16,19 @@ use std::f64::consts::{PI, SQRT_2};
 /// Standard errors on either side of a 95 % interval.
 const INTERVAL: f64 = 1.96;
 
-/// Least scatter about a prediction, relative to the whole scatter. With less, answers near the
-/// boundary depend on their last digit.
+/// Least scatter about a prediction, relative to the whole: below, last digits decide answers.
 const LEAST_SCATTER: f64 = 0.25;
 
 /// Scatter used in place of 0 \[voxel lengths\], to avoid a division by 0.
 const NONE: f64 = 1e-9;
 
-/// An estimate with its standard error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Estimate {
-    /// The estimate.
     pub(crate) value: f64,
-    /// Its standard error.
     pub(crate) error: f64,
 }
 
 impl Estimate {
-    /// Returns its 95 % interval.
     pub(crate) fn interval(&self) -> [f64; 2] {
         [-INTERVAL, INTERVAL].map(|errors| self.value + errors * self.error)
     }
@@ -65,9 +60,6 @@ pub(crate) struct Trainability {
 /// Predictions are noisy already, so the scatter about them is smaller by as much. Standard errors
 /// cover changes of rollouts and of images. An answer is correct if its margin is above `threshold`
 /// \[voxel lengths\].
-///
-/// # Errors
-/// Returns [`Stopped`] if `stop` was set in the meantime.
 pub(crate) fn teachable(
     shown: &[RandomRollout],
     scatter: f64,
@@ -92,7 +84,6 @@ pub(crate) fn teachable(
     }))
 }
 
-/// One half of the rollouts and of the examples.
 struct Half<'a> {
     response: Response,
     rollouts: f64,
@@ -103,7 +94,6 @@ struct Half<'a> {
     examples: Vec<&'a Example>,
 }
 
-/// A design and its side.
 type Solved = (Vec<Material>, f64);
 
 impl<'a> Half<'a> {
@@ -139,8 +129,7 @@ impl<'a> Half<'a> {
         Some([half(0)?, half(1)?])
     }
 
-    /// Returns the best design by the slopes of this half, and its side: 1 if it walks right for
-    /// examples whose `right` is 1, −1 if it walks left for them.
+    /// Returns the best design by this half's slopes, and its side: −1 if `right` 1 walks left.
     fn solved(&self, seed: u64, number: u64) -> Solved {
         let Response {
             slopes, intercept, ..
@@ -252,12 +241,10 @@ fn right(margin: f64, scatter: f64, threshold: f64) -> (f64, f64) {
     (normal(beyond), density(beyond) / scatter)
 }
 
-/// Returns the standard normal distribution function at x.
 fn normal(x: f64) -> f64 {
     0.5 * libm::erfc(-x / SQRT_2)
 }
 
-/// Returns the standard normal density at x.
 fn density(x: f64) -> f64 {
     libm::exp(-0.5 * x * x) / (2.0 * PI).sqrt()
 }

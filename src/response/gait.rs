@@ -13,18 +13,16 @@ pub(crate) const CHOICES: [Material; 3] = [
     Material::SensorShrink,
 ];
 
-/// Materials that a [design problem](super::lesson) chooses from: sensors. A response is measured
-/// with sensors at all places, so it does not cover soft voxels. A soft voxel differs from a sensor
-/// at rest: it has no goal, so the sides that it shares take its neighbour's goal, and its springs
-/// have another stiffness (`physics.md`, "Actuation").
+/// Materials that a [design problem](super::lesson) chooses from: sensors, with which a response is
+/// measured. A soft voxel differs from one at rest: it has no goal, so the sides that it shares
+/// take its neighbour's goal, and its springs have another stiffness (`physics.md`, "Actuation").
 pub(crate) const SENSORS: [Material; 2] = [CHOICES[CHOSEN.start], CHOICES[CHOSEN.start + 1]];
 
 /// Indices of [`SENSORS`] in [`CHOICES`].
 pub(super) const CHOSEN: Range<usize> = 1..CHOICES.len();
 
-/// Probability that a place is wide in a random image, and that it is narrow. A design has about as
-/// many of either. Larger values leave out widths in between, as under grey pixels; smaller ones
-/// carry less information about the slopes.
+/// Probability that a place is wide in a random image, and that it is narrow. Larger values leave
+/// out widths in between, as under grey pixels; smaller ones tell less about the slopes.
 const EXTREME: f64 = 0.4;
 
 /// A walking body in which the materials of soft voxels and sensors are left open.
@@ -58,7 +56,6 @@ impl Gait {
         &self.places
     }
 
-    /// Returns the materials at the places of its own body.
     pub(crate) fn design(&self) -> Design {
         self.places
             .iter()
@@ -83,7 +80,6 @@ impl Gait {
         Body::new(voxels).expect("a body with other materials is as large as before")
     }
 
-    /// Returns the body with an expanding sensor at every place, for measuring its response.
     pub(crate) fn probe(&self) -> Body {
         self.body.probe()
     }

@@ -15,11 +15,9 @@ const LEAST_GAIN: f64 = 1e-9;
 /// Most sweeps over all places; a search ends sooner when a sweep changes nothing.
 const SWEEPS: usize = 12;
 
-/// Number of random designs that a search from many starts from. More of them cost as much each,
-/// and seldom end better.
+/// Random designs that a search from many starts from; more cost as much each and seldom help.
 const STARTS: usize = 6;
 
-/// An image of a design problem.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Example {
     /// Target width of each place under it, for each of [`CHOICES`] \[rest widths\].
@@ -33,7 +31,6 @@ pub(crate) struct Example {
 }
 
 impl Example {
-    /// Makes an example from the stimulus of a gait.
     pub(crate) fn new(gait: &Gait, stimulus: &Grid<f64>, physics: &Physics) -> Self {
         let widths = |place: &(usize, usize)| {
             CHOICES.map(|material| width(material, stimulus.or_default(*place), physics))
@@ -56,7 +53,6 @@ impl Example {
     }
 }
 
-/// Value of the worst answer.
 const WORST: f64 = -1.0;
 
 fn choice(material: Material) -> usize {
@@ -110,9 +106,8 @@ impl DesignProblem {
         lesson
     }
 
-    /// Makes a problem whose examples have the displacements that the model predicts for `design`:
-    /// by the slopes, and by an intercept for each example. With a `side` of −1 the correct
-    /// directions are reversed.
+    /// Makes a problem whose examples have the displacements predicted for `design`, by the slopes
+    /// and an intercept each. A `side` of −1 reverses the correct directions.
     pub(crate) fn predicted<'a>(
         examples: impl IntoIterator<Item = (&'a Example, f64)>,
         slopes: &[f64],
@@ -128,20 +123,17 @@ impl DesignProblem {
         DesignProblem::new(&examples.iter().collect::<Vec<_>>(), slopes, design)
     }
 
-    /// Computes the objective from scratch.
     fn count(&mut self) {
         let clipped =
             |(margin, weight): (&f64, &f64)| weight * (margin / ENOUGH).clamp(self.floor, 1.0);
         self.objective = self.margins.iter().zip(&self.weights).map(clipped).sum();
     }
 
-    /// Returns the weighted mean [clipped margin](crate::task::fitness::clipped_margin) of the
-    /// answers: from −1 to 1, the best.
+    /// Returns the answers' weighted mean clipped margin: from −1 to 1, the best.
     pub(crate) fn objective(&self) -> f64 {
         self.objective
     }
 
-    /// Returns the current design.
     pub(crate) fn design(&self) -> Design {
         self.design.iter().map(|choice| CHOICES[*choice]).collect()
     }
@@ -237,7 +229,6 @@ impl DesignProblem {
     }
 }
 
-/// Returns the one with the larger objective; the first wins a tie.
 fn better<T>(best: (f64, T), next: (f64, T)) -> (f64, T) {
     if next.0 > best.0 { next } else { best }
 }

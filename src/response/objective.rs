@@ -21,9 +21,8 @@ const OF_EVOLUTION: u64 = 1 << 32;
 /// decides; with less, hopeless bodies cost as much as good ones.
 const WORTH_GOING_ON: f64 = 0.5;
 
-/// Returns as many images as there are training images, an even number, in pairs: one whose pixels
-/// are bright, dark or at rest at random, independently of each other, and its opposite. Pixels
-/// that are the same in all training images keep their values: a constant carries no information.
+/// Returns as many images as there are training images, in pairs: one with pixels bright, dark or
+/// at rest at random, and its opposite. Pixels that never differ in training keep their values.
 fn opposites(stimuli: &[Grid<f64>], physics: &Physics, seed: u64) -> Vec<Grid<f64>> {
     let Some(first) = stimuli.first() else {
         return Vec::new();
@@ -61,8 +60,7 @@ fn conditions(images: usize) -> Vec<Condition> {
         .collect()
 }
 
-/// Returns true if, after the first half of its pairs (at least two of each condition), a body is
-/// so far from the response to beat that the rest is not worth simulating.
+/// True if, after half of its pairs (at least two a condition), a body is hopelessly behind.
 fn is_left_behind(known: &[Option<f64>], to_beat: f64) -> bool {
     // Two images a pair; equally many pairs of each condition.
     let first = (known.len() / 8 * 4).max(LEAST_IMAGES).min(known.len());
@@ -98,10 +96,9 @@ impl Objective for GaitResponse {
         false
     }
 
-    /// The square root of the number of soft voxels and sensors, up to two thirds of the grid. Of
-    /// two gaits with equally strong responses, the one with more places can be trained further:
-    /// together they can move it by at most this factor (Cauchy's inequality), and only if all
-    /// respond alike. The limit is there because something has to walk.
+    /// √(number of soft voxels and sensors), up to two thirds of the grid: together they can move a
+    /// gait by at most this factor (Cauchy's inequality), if all respond alike. Limited because
+    /// something has to walk.
     fn factor(&self, body: &Body) -> f64 {
         let most = body.height() * body.width() * 2 / 3;
         (body.probe().counts().sensor.clamp(1, most.max(1)) as f64).sqrt()

@@ -77,8 +77,7 @@ impl Probing {
     }
 }
 
-/// Returns the response from the stable rollouts `shown`, out of `rollouts`; `None` if most are
-/// unstable, or too few stable.
+/// Returns the response from `shown` of all `rollouts`; `None` if most are unstable or few stable.
 pub(crate) fn response(shown: &[RandomRollout], rollouts: usize) -> Option<Response> {
     if 2 * shown.len() > rollouts {
         Response::of(shown)

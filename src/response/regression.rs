@@ -26,7 +26,6 @@ pub(crate) struct Moments {
 }
 
 impl Moments {
-    /// Makes the sums of no rollout, for a gait with this number of places.
     pub(crate) fn new(places: usize) -> Self {
         Moments {
             count: 0.0,
@@ -80,8 +79,7 @@ impl Moments {
     }
 }
 
-/// The data on slopes: sums over sets of rollouts, each set about its own means, so that sets may
-/// differ in their intercepts.
+/// Sums over sets of rollouts, each about its own means: sets may differ in intercepts.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Evidence {
     matrix: DMatrix<f64>,
@@ -89,7 +87,6 @@ pub(crate) struct Evidence {
 }
 
 impl Evidence {
-    /// Makes evidence of no rollout, for a gait with this number of places.
     pub(crate) fn new(places: usize) -> Self {
         Evidence {
             matrix: DMatrix::zeros(places, places),
@@ -97,7 +94,6 @@ impl Evidence {
         }
     }
 
-    /// Adds a set of rollouts with a weight.
     pub(crate) fn add(&mut self, set: &Moments, weight: f64) {
         if set.count == 0.0 {
             return;
@@ -190,11 +186,9 @@ impl Fit {
     }
 }
 
-/// The response of a gait, from rollouts with random images.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Response {
-    /// Displacement of the body to the right for each place that is wider by one rest width \[voxel
-    /// lengths\], in the places' order.
+    /// Displacement to the right per place that is wider by a rest width \[voxel lengths\].
     pub(crate) slopes: Vec<f64>,
     /// Standard errors of the slopes, including the shrinkage by the penalty \[voxel lengths\].
     pub(crate) errors: Vec<f64>,
@@ -202,17 +196,13 @@ pub(crate) struct Response {
     pub(crate) intercept: f64,
     /// Intercept under each condition; none without rollouts.
     pub(crate) intercepts: Vec<Option<f64>>,
-    /// Standard deviation of displacements about predictions from slopes of other rollouts,
-    /// cross-validated \[voxel lengths\].
+    /// Standard deviation about cross-validated predictions \[voxel lengths\].
     pub(crate) noise: f64,
-    /// Standard deviation of displacements about predictions from the true slopes: `noise` without
-    /// the slopes' errors \[voxel lengths\].
+    /// Standard deviation about predictions from the true slopes \[voxel lengths\].
     pub(crate) scatter: f64,
     /// Fraction of the displacements' variance that slopes fitted to other rollouts explain.
     pub(crate) r_squared: f64,
-    /// The chosen penalty.
     pub(crate) ridge: f64,
-    /// Data of the fit.
     pub(crate) evidence: Evidence,
 }
 
@@ -228,8 +218,7 @@ pub struct RandomRollout {
 }
 
 impl Response {
-    /// Fits slopes with the penalty that predicts left-out rollouts best. Returns `None` for fewer
-    /// than two rollouts per fold.
+    /// Fits slopes with the penalty that predicts left-out rollouts best; `None` if too few.
     pub(crate) fn of(rollouts: &[RandomRollout]) -> Option<Self> {
         let places = rollouts.first()?.widths.len();
         if rollouts.len() < 2 * FOLDS {
@@ -318,10 +307,9 @@ impl Response {
         })
     }
 
-    /// Returns the error of the slopes relative to the slopes: from 0, known exactly, to 1, nothing
-    /// known. Each place has the weight of its width's variation, so this is the relative error of
-    /// the displacements predicted for random images. Its square is the share of the variance that
-    /// exact slopes would explain and these do not.
+    /// Returns the error of the slopes relative to the slopes, 0 to 1: the relative error of
+    /// predictions for random images. Its square is the share of the variance that exact slopes
+    /// would explain and these do not.
     pub(crate) fn relative_error(&self) -> f64 {
         let weighed = |numbers: &[f64]| -> f64 {
             numbers

@@ -10,9 +10,6 @@ use crate::store::stored_run::StoredRun;
 use std::path::{Path, PathBuf};
 
 /// Opens a run.json, or the built-in run of the published robots.
-///
-/// # Errors
-/// As [`StoredRun::read`].
 pub(crate) fn open(path: &Path) -> Result<StoredRun, Error> {
     match path == published::archive() {
         true => Ok(StoredRun {
@@ -23,11 +20,7 @@ pub(crate) fn open(path: &Path) -> Result<StoredRun, Error> {
     }
 }
 
-/// Returns the archives to select from: the named ones, or the published robots if the selection
-/// names them, or the newest run.
-///
-/// # Errors
-/// Returns an error if there is no run.
+/// Returns the archives to select from: the named ones, the published robots, or the newest run.
 pub(crate) fn archives(
     named: Vec<PathBuf>,
     robots: Selection,

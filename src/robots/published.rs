@@ -22,7 +22,6 @@ use std::path::{Path, PathBuf};
 /// Config under which the published robots were evolved.
 const CONFIG: &str = "zero_one_published.toml";
 
-/// Name of the set of all published robots.
 pub(crate) const ALL: &str = "gallery";
 
 pub(crate) const TEXT: &str = include_str!("../../data/gallery.json");
@@ -131,11 +130,7 @@ pub fn config() -> Result<Config, Error> {
     Config::parse(text, CONFIG, &[])
 }
 
-/// Returns true if a selection without an archive names published robots, one by one or all by
-/// "gallery".
-///
-/// # Errors
-/// As [`gallery()`]; also if only some of the names are published.
+/// True if a selection without an archive names published robots, one by one or as "gallery".
 pub(crate) fn is_meant(selection: &Selection) -> Result<bool, Error> {
     let Selection::Ids(ids) = selection else {
         return Ok(false);
@@ -167,16 +162,12 @@ pub(crate) fn provenance(run: &str, seed: u64) -> String {
     }
 }
 
-/// Returns the archive of the published robots.
 pub(crate) fn archive() -> PathBuf {
     Path::new(gallery::PUBLISHED).join(RUN_JSON)
 }
 
 /// Builds a run of the published robots. Their genomes were not published, so each has the empty
 /// one, and plus or minus its fitness as displacements.
-///
-/// # Errors
-/// Returns an error if the built-in data are damaged (which a test excludes).
 pub(crate) fn run() -> Result<RunFile, Error> {
     let config = config()?;
     let indices = config.data.train_images.iter().flatten();

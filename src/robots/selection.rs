@@ -12,15 +12,11 @@ use crate::store::validation::{Validated, ranking};
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// The word for the best robot.
 pub(crate) const BEST: &str = "best";
 
-/// A robot and the index of its run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Chosen<'a> {
-    /// Index of its run.
     pub(crate) source: usize,
-    /// The robot.
     pub(crate) robot: &'a Robot,
 }
 
@@ -97,7 +93,6 @@ impl Selection {
         }
     }
 
-    /// Describes the selection to the user.
     pub(crate) fn describe(&self) -> String {
         match self {
             Selection::All => "all elites".to_string(),
@@ -123,12 +118,8 @@ impl Selection {
         }
     }
 
-    /// Returns the robots, by default task by task and fittest first. `seed` draws the random ones.
-    /// For a validation, returns all candidates.
-    ///
-    /// # Errors
-    /// Returns an error if an id matches no robot or several, or if physical ones are selected and
-    /// the audits are incomplete.
+    /// Returns the robots, by default task by task and fittest first; for a validation, all
+    /// candidates. `seed` draws the random ones. Physical ones need complete audits.
     pub(crate) fn of<'a>(
         &self,
         sources: &'a [StoredRun],
@@ -156,11 +147,8 @@ impl Selection {
         self.among(fittest, sources, seed)
     }
 
-    /// Splits the selection into one by ids for each run, so that runs can be handled one by one;
-    /// `None` for a run without a selected robot. A validation selects run by run already.
-    ///
-    /// # Errors
-    /// As [`Selection::of`].
+    /// Splits the selection into one by ids for each run; `None` for a run without a selected
+    /// robot. A validation selects run by run already.
     pub(crate) fn of_each(
         &self,
         sources: &[StoredRun],
@@ -248,8 +236,7 @@ impl Selection {
                 let found: Result<Vec<_>, Error> = robots.iter().map(find).collect();
                 Ok(found?.into_iter().flatten().collect())
             }
-            // A ranking needs audits only down to the last robot chosen; `first_physical` checks
-            // those.
+            // Rankings need audits only down to the last chosen; `first_physical` checks.
             Selection::Physical(of)
                 if of.validated().is_some() && !all_audited(&fittest, sources)? =>
             {
@@ -260,11 +247,8 @@ impl Selection {
     }
 }
 
-/// Returns the best of some robots, given fittest first: the best on validation images if all runs
-/// have rankings and any of these is in one, else the fittest.
-///
-/// # Errors
-/// Returns an error if a ranking cannot be read.
+/// Returns the best of robots given fittest first: the best on validation images if all runs have
+/// rankings and any of these is in one, else the fittest.
 fn best<'a>(fittest: &[Chosen<'a>], sources: &'a [StoredRun]) -> Result<Option<Chosen<'a>>, Error> {
     let rankings: Result<Vec<Option<Vec<Validated>>>, Error> =
         sources.iter().map(ranking).collect();
@@ -330,7 +314,6 @@ pub(crate) fn by_id<'a>(robots: &[Chosen<'a>], id: &str) -> Result<Vec<Chosen<'a
     }
 }
 
-/// Returns the path of the run's audit.
 fn path(source: &StoredRun) -> PathBuf {
     AuditFile::path(&source.path)
 }
@@ -342,10 +325,7 @@ fn audits(sources: &[StoredRun]) -> Result<Vec<AuditFile>, Error> {
         .collect()
 }
 
-/// Returns true if all these robots have verdicts.
-///
-/// # Errors
-/// As [`AuditFile::of_run`].
+/// True if all these robots have verdicts.
 pub(crate) fn all_audited(robots: &[Chosen], sources: &[StoredRun]) -> Result<bool, Error> {
     let audits = audits(sources)?;
     Ok(robots
@@ -414,9 +394,6 @@ pub(crate) fn physical<'a>(
 
 /// Returns the first `count` physical robots of each task, given best on validation images first.
 /// Robots ranked after those need no audit.
-///
-/// # Errors
-/// Returns an error if one ranked before them has no audit, or if none of a task is physical.
 pub(crate) fn first_physical<'a>(
     ranked: Vec<(&'a Robot, Validated)>,
     source: &StoredRun,

@@ -24,11 +24,9 @@ use std::time::{Duration, Instant};
 /// Interval at which lines of `metrics.csv` reach the file, for those who watch it.
 const FLUSH_EVERY: Duration = Duration::from_secs(1);
 
-/// Least time between timed checkpoints, in multiples of the cost of the last one. Large
-/// checkpoints of long runs thus take at most two percent of the time.
+/// Least time between timed checkpoints, in costs of the last one: at most two percent of the time.
 const MOST_SHARE: u32 = 50;
 
-/// The output files of a run.
 pub(crate) struct Files {
     pub(crate) folder: RunFolder,
     pub(crate) metrics: Metrics,
@@ -53,7 +51,6 @@ pub(crate) struct Run<'a> {
     search: MapElites<Robot>,
     known: KnownBodies,
     totals: Totals,
-    /// Generations completed.
     pub(crate) generation: u64,
     began: Instant,
 }
@@ -153,11 +150,8 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Makes and evaluates a generation, and adds it to the archive. All ranks do the same, but
-    /// each evaluates only its share.
-    ///
-    /// # Errors
-    /// If it was stopped, the kind is [`ErrorKind::Stopped`], and the run is as it was before.
+    /// Makes, evaluates and adds a generation. Each rank evaluates only its share. If it was
+    /// stopped, the run is as it was before.
     fn next_generation(&mut self, mutations: &Mutations, session: &Session) -> Result<(), Error> {
         let proposals = self.search.ask(self.generation);
         let make = |&proposal: &Proposal| {
@@ -262,7 +256,6 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Adds those children to the archive that were stable and are fit enough.
     fn tell(&mut self, children: Vec<Child>, evaluations: Vec<Evaluation>) -> Result<(), Error> {
         let thresholds = self.admission_thresholds();
         let mut told = Vec::new();
@@ -362,9 +355,8 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// Returns by task the fitness of the last elite that `archive.keep` keeps; `None` while all
-    /// are kept or there are fewer. It never decreases, so a robot at or below it can never enter
-    /// later: early stop and known bodies stay lossless.
+    /// Returns by task the fitness of the last elite that `archive.keep` keeps; `None` with fewer.
+    /// It never decreases, so early stop and known bodies stay lossless.
     fn admission_thresholds(&self) -> Vec<Option<f64>> {
         let keep = self.config.archive.keep;
         let last = |name: String| {
@@ -379,7 +371,6 @@ impl<'a> Run<'a> {
             .collect()
     }
 
-    /// Returns the coordinates of the cell of a robot that performs a task.
     fn cell(&self, mut bins: Vec<usize>, task: usize) -> Vec<usize> {
         bins.extend((self.grouping.tasks().len() > 1).then_some(task));
         bins
@@ -422,7 +413,6 @@ impl<'a> Run<'a> {
         folder.write_run(&checkpoint.run)
     }
 
-    /// Returns the run in its current state.
     pub(crate) fn file(&self) -> RunFile {
         let Run { name, config, .. } = self;
         let data = (&self.training.dataset, self.training.images.clone());
@@ -440,7 +430,6 @@ pub(crate) struct Mutations<'a> {
     pub(crate) session: &'a Session<'a>,
 }
 
-/// Returns a robot without results.
 fn unevaluated((genome, body): (Genome, Body), generation: u64, parent: Option<&Robot>) -> Robot {
     Robot {
         id: genome.id(),
@@ -456,7 +445,6 @@ fn unevaluated((genome, body): (Genome, Body), generation: u64, parent: Option<&
     }
 }
 
-/// Converts the error of a robot that could not be made.
 pub(crate) fn unmade(error: GenomeError) -> Error {
     match error {
         GenomeError::Stopped(stopped) => stopped.into(),

@@ -22,7 +22,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Actuation cycles per image in the paper's test.
 pub const CYCLES: u32 = 10;
 
-/// Converts actuation cycles to control steps.
 pub(crate) fn control_steps(config: &Config, cycles: u32) -> u32 {
     cycles.saturating_mul(config.physics.cycle_steps)
 }
@@ -40,11 +39,9 @@ pub(crate) fn task_of<'a>(
 
 pub(crate) struct HeldOutRun<'a> {
     pub(crate) config: &'a Config,
-    /// Control steps per image.
     pub(crate) control_steps: u32,
     pool: &'a rayon::ThreadPool,
     pub(crate) session: &'a Session<'a>,
-    /// Rollouts so far.
     done: AtomicU64,
 }
 
@@ -78,9 +75,8 @@ impl<'a> HeldOutRun<'a> {
             .begins(&Work::new(label, showings, "rollouts"));
     }
 
-    /// Returns the displacement under each image (`None`: unstable) and the number of rollouts.
-    /// Images with the same pixels at the sensors share a rollout. Returns `None` if it was
-    /// stopped.
+    /// Returns each displacement (`None`: unstable) and the number of rollouts; `None` if stopped.
+    /// Images with the same pixels at the sensors share a rollout.
     pub(crate) fn rollouts(
         &self,
         robot: &Robot,
@@ -122,7 +118,6 @@ impl<'a> HeldOutRun<'a> {
     }
 }
 
-/// The evaluation of one robot on images.
 pub(crate) struct Trial<'a> {
     pub(crate) run: &'a RunFile,
     pub(crate) robot: &'a Robot,

@@ -28,7 +28,6 @@ pub struct RobotChoice {
 /// A robot, by name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Named {
-    /// Its archive.
     pub(crate) archive: PathBuf,
     /// Its id, the beginning of one, or "best".
     pub robot: String,

@@ -14,11 +14,8 @@ use crate::store::run::RunFile;
 use std::path::Path;
 
 /// Returns the state to resume from; `None` if the folder has no run yet. Skips a broken newest
-/// checkpoint and resumes from a `run.json` without checkpoints; `warn` reports either.
-///
-/// # Errors
-/// Returns an error, and changes nothing, if all checkpoints are broken, if there is none and the
-/// `run.json` is not sufficient, or if the run is another one.
+/// checkpoint and resumes from a `run.json` without checkpoints; `warn` reports either. Errors
+/// change nothing.
 pub(crate) fn saved(
     folder: &RunFolder,
     config: &Config,
@@ -63,12 +60,9 @@ pub(crate) fn saved(
     Ok(Some(saved))
 }
 
-/// Builds a checkpoint from a `run.json` alone. Later generations depend only on its elites: a body
-/// that was evaluated before and is no elite would not become one now. A measured response is an
-/// exception: of gaits that differ only in sensors, the first stays.
-///
-/// # Errors
-/// Returns an error if it is unreadable, if its fitness is a response, or if it is a training.
+/// Builds a checkpoint from a `run.json` alone: later generations depend only on its elites, since
+/// a body evaluated before would not become one now. Not so for a measured response (of gaits that
+/// differ only in sensors, the first stays) or a training: errors.
 fn without_checkpoint(path: &Path) -> Result<Checkpoint, Error> {
     let run = RunFile::read(path)?;
     let needs = if run.origin.is_some() {

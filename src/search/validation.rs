@@ -55,12 +55,9 @@ const ROUNDS: [Round; 3] = [
     },
 ];
 
-/// The settings of a choice.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wanted {
-    /// Number of robots of each task.
     pub(crate) count: usize,
-    /// Number of images in total.
     pub(crate) images: usize,
     /// Command-line argument that set `images`; `None` if the config did.
     pub(crate) argument: Option<&'static str>,
@@ -68,10 +65,8 @@ pub(crate) struct Wanted {
     pub(crate) threshold: f64,
 }
 
-/// The run to choose from, and the number of robots.
 #[derive(Clone, Debug)]
 pub(crate) struct ValidationOptions {
-    /// Path of the run.json.
     pub(crate) archive: PathBuf,
     /// Number of robots of each task; `None`: that of the config.
     pub(crate) best: Option<usize>,
@@ -79,9 +74,6 @@ pub(crate) struct ValidationOptions {
 
 /// Chooses the best robots of a run on its `[validation]` images, evaluated as by `eval`, and keeps
 /// them beside the run; `None` if stopped.
-///
-/// # Errors
-/// Returns an error if run or data is unsuitable, or if there are not enough images.
 pub(crate) fn validate(
     options: &ValidationOptions,
     session: &Session,
@@ -100,9 +92,6 @@ pub(crate) fn validate(
 }
 
 /// Chooses as many robots as the config of a finished run wants, with data already loaded.
-///
-/// # Errors
-/// As [`validate`].
 pub(crate) fn at_end(
     archive: &Path,
     dataset: &Dataset,
@@ -140,11 +129,7 @@ fn rank(
     Ok(best.map(|best| best.into_iter().map(|(_, validated)| validated).collect()))
 }
 
-/// Returns the best robots of each run and task, or the best physical ones if selected, with their
-/// results; `None` if stopped.
-///
-/// # Errors
-/// As [`best_of_run`] and [`first_physical`].
+/// Returns the best (physical) robots of each run and task with results; `None` if stopped.
 pub(crate) fn best_of_runs<'a>(
     sources: &'a [StoredRun],
     robots: &[Chosen<'a>],
@@ -192,9 +177,6 @@ pub(crate) fn best_of_runs<'a>(
 }
 
 /// Returns the best robots of each task of a run, best first, with results; `None` if stopped.
-///
-/// # Errors
-/// Returns an error if there are not enough images, or if the result cannot be kept.
 pub(crate) fn best_of_run<'a>(
     source: &'a StoredRun,
     dataset: &Dataset,
@@ -301,7 +283,6 @@ fn is_own(run: &RunFile, robots: &[&Robot], wanted: &Wanted, control_steps: u32)
         && robots.len() == all
 }
 
-/// Hashes everything that the result depends on.
 fn key(
     run: &RunFile,
     robots: &[&Robot],
@@ -402,8 +383,7 @@ fn screened(
                 };
                 scores.push((robot, RobotReport::new(&trial, displacements, 0)));
             }
-            // The sort is stable: ties keep the order of the round before, at first that of
-            // fitness.
+            // The sort is stable: ties keep the order of the round before, at first by fitness.
             scores.sort_by(|(_, a), (_, b)| b.balanced_accuracy.total_cmp(&a.balanced_accuracy));
             left = scores
                 .iter()

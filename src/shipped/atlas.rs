@@ -5,7 +5,6 @@ use std::ffi::OsStr;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Prefix of the names of the atlas's runs.
 pub(crate) const PREFIX: &str = "atlas:";
 
 /// Environment variable with the folder of the atlas.
@@ -14,7 +13,6 @@ pub(crate) const VARIABLE: &str = "MORPHCOG_ATLAS";
 /// Folder of the atlas in the repository, searched second.
 const FOLDER: &str = "data/atlas";
 
-/// Suffix of the names of compressed files.
 const COMPRESSED: &str = ".gz";
 
 /// Returns the folders to search, in order; `variable` is the value of `MORPHCOG_ATLAS`.
@@ -29,17 +27,13 @@ fn variable() -> Option<std::ffi::OsString> {
     std::env::var_os(VARIABLE)
 }
 
-/// Returns the folder of the atlas that has a run.
 pub(crate) fn folder_of(run: &str) -> Option<PathBuf> {
     folders(variable().as_deref())
         .into_iter()
         .find(|folder| holds_run(&folder.join(run)))
 }
 
-/// Returns the path of a run's compressed file.
-///
-/// # Errors
-/// Returns an error that names the places searched, the runs there are, and how to get the atlas.
+/// Returns the path of a run's compressed file; the error says where it may be and how to get it.
 pub(crate) fn file(run: &str, file: &str) -> io::Result<PathBuf> {
     found(run, file, variable().as_deref())
 }
@@ -87,7 +81,6 @@ fn found(run: &str, file: &str, variable: Option<&OsStr>) -> io::Result<PathBuf>
     ))
 }
 
-/// Returns the names of the runs in a folder, in order.
 fn names(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let of_runs = entries.filter(|entry| holds_run(&entry.path()));

@@ -3,7 +3,6 @@
 
 use std::path::{Path, PathBuf};
 
-/// Prefix of the names of shipped runs.
 pub(crate) const PREFIX: &str = "gallery:";
 
 /// The run of the published robots. It has no files: `robots::published` builds it from a list.
@@ -27,7 +26,6 @@ type Run = (&'static str, &'static [(&'static str, &'static str)]);
 /// Runs that belong together: the name of the set, and at least one run.
 type Set = (&'static str, &'static [Run]);
 
-/// Makes a run from the files in a folder of `data/`.
 #[cfg(feature = "gallery")]
 macro_rules! run {
     ($name:expr, $folder:expr) => {
@@ -101,7 +99,6 @@ const SETS: &[Set] = &[
     ),
 ];
 
-/// Returns the text of a file of a run; none if there is no such run or file.
 pub(crate) fn text(name: &str, file: &str) -> Option<&'static str> {
     let (_, files) = SETS
         .iter()
@@ -113,10 +110,7 @@ pub(crate) fn text(name: &str, file: &str) -> Option<&'static str> {
         .map(|(_, text)| *text)
 }
 
-/// Returns the `run.json` of every run of a set, or of one run.
-///
-/// # Errors
-/// Returns an error that lists the runs if none has that name.
+/// Returns the `run.json` of every run of a set, or of one run; the error lists the runs there are.
 pub(crate) fn runs(name: &str) -> Result<Vec<PathBuf>, String> {
     if name == PUBLISHED {
         return Ok(vec![Path::new(PUBLISHED).join("run.json")]);

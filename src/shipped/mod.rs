@@ -10,11 +10,8 @@ use flate2::read::MultiGzDecoder;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// The place of a named run's file.
 enum Place {
-    /// In the program.
     Shipped(&'static str),
-    /// In a file, compressed with gzip.
     Compressed(PathBuf),
 }
 
@@ -60,9 +57,6 @@ fn place(path: &Path) -> Option<io::Result<Place>> {
 }
 
 /// Reads a text file of a run, named or on the disk.
-///
-/// # Errors
-/// As [`files::read_text`]; if the atlas lacks the file, the error says what to do.
 pub(crate) fn read_text(path: &Path) -> io::Result<String> {
     match place(path).transpose()? {
         Some(Place::Shipped(text)) => Ok(text.to_string()),
@@ -77,9 +71,6 @@ pub(crate) fn exists(path: &Path) -> bool {
 }
 
 /// Returns the `run.json` of every run that a name stands for.
-///
-/// # Errors
-/// Returns an error that lists the shipped runs if none of them has that name.
 pub(crate) fn runs(path: &Path) -> Result<Vec<PathBuf>, String> {
     let (name, _) = parts(path).expect("callers ask is_named before");
     name.strip_prefix(atlas::PREFIX)

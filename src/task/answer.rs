@@ -47,7 +47,6 @@ impl Direction {
         (displacement.abs() > threshold).then_some(direction)
     }
 
-    /// Returns its name in files: "left" or "right".
     pub(crate) fn name(self) -> &'static str {
         match self {
             Direction::Left => "left",
@@ -55,7 +54,6 @@ impl Direction {
         }
     }
 
-    /// Returns the direction with a name.
     pub(crate) fn named(name: &str) -> Option<Self> {
         [Direction::Left, Direction::Right]
             .into_iter()
@@ -84,7 +82,6 @@ impl Assignment {
         }
     }
 
-    /// Returns the direction in which a group should walk.
     pub(crate) fn expected(self, group: Group) -> Direction {
         match (group, self.a) {
             (Group::A, way) => way,
@@ -101,16 +98,14 @@ impl Assignment {
         }
     }
 
-    /// Returns true if a displacement is the correct answer to an image of a group: farther than
-    /// `threshold`, the correct way.
+    /// True if a displacement is the correct answer: farther than `threshold`, the group's way.
     pub(crate) fn is_right(self, group: Group, displacement: f64, threshold: f64) -> bool {
         Direction::of(displacement, threshold) == Some(self.expected(group))
     }
 }
 
-/// Returns true if a walk is the correct answer to an image of a class: farther than `threshold`,
-/// in the direction of the class's group; `None` if the class is in neither group. An unstable walk
-/// (`None`) is wrong.
+/// True if a walk is the correct answer to a class: farther than `threshold`, its group's way;
+/// `None` if it is in neither group. An unstable walk (`None`) is wrong.
 pub(crate) fn is_correct(
     split: &ClassSplit,
     assignment: Assignment,
@@ -131,7 +126,6 @@ pub(crate) struct Readout {
     pub(crate) right: Vec<u8>,
 }
 
-/// The answer of a walk so far.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Reading {
     /// Displacement under the current image, voxel lengths, right positive.
@@ -143,8 +137,7 @@ pub(crate) struct Reading {
 }
 
 impl Readout {
-    /// Makes the judge of a task, given the direction of its first group; none if every class
-    /// should walk the same way.
+    /// Makes a task's judge, given the first group's direction; none if all should walk one way.
     pub(crate) fn of(split: &ClassSplit, assignment: Assignment) -> Option<Self> {
         if split.is_same_way() {
             return None;

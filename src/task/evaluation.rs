@@ -206,7 +206,6 @@ pub(crate) fn fresh_rollouts_so_far(
 struct Shown {
     /// Displacement under each image, voxel lengths; none where it became unstable.
     displacements: Vec<Option<f64>>,
-    /// The instability, if any.
     unstable: Option<Unstable>,
 }
 
@@ -222,7 +221,6 @@ impl Shown {
 struct Progress {
     /// Rollouts that have ended but are not counted yet, in the order of counting.
     ended: Vec<Option<Shown>>,
-    /// Number of counted rollouts.
     counted: usize,
     /// Displacements of the counted rollouts, in the order of showing.
     displacements: Vec<Option<f64>>,
@@ -232,14 +230,12 @@ struct Progress {
     verdict: Option<Evaluation>,
 }
 
-/// Makes the outcome of a robot that walked under all images.
 fn walked(known: Vec<Option<f64>>) -> Outcome {
     let displacement =
         |known: Option<f64>| known.expect("no rollout was left out, and none was unstable");
     Outcome::Walked(known.into_iter().map(displacement).collect())
 }
 
-/// The data that all jobs share.
 struct Setup<'a> {
     images: &'a [Grid<f64>],
     /// Every condition once, the default first.
@@ -352,8 +348,7 @@ impl<'a> Setup<'a> {
         Ok(self.in_unperturbed_frame(StepError::outcome(rollout)?, number))
     }
 
-    /// Simulates fresh rollouts under at most [`Worlds::MOST`] images of the same condition, with
-    /// the same bits as one by one.
+    /// Simulates at most [`Worlds::MOST`] images of one condition, with unchanged bits.
     fn side_by_side(
         &self,
         body: &Body,
@@ -411,8 +406,7 @@ impl<'a> Setup<'a> {
         condition.iter().fold(self.images[image].clone(), see)
     }
 
-    /// Returns the displacement in the unperturbed frame: a mirrored walk is mirrored back, and an
-    /// instability that a condition excuses counts as standing still.
+    /// Mirrors a mirrored walk back; an instability that a condition excuses is standing still.
     fn in_unperturbed_frame(
         &self,
         displacement: Result<f64, Unstable>,
@@ -436,7 +430,6 @@ struct Candidate<'a> {
     job: &'a Job<'a>,
     setup: &'a Setup<'a>,
     early_stop: bool,
-    /// System of each condition.
     systems: Vec<Arc<System>>,
     /// Images to simulate, in order.
     order: Vec<usize>,
@@ -537,8 +530,7 @@ impl<'a> Candidate<'a> {
         Ok(())
     }
 
-    /// Returns the outcome for a robot with these displacements, in the order of showing, whatever
-    /// the rest may be; `None` if the rest matters.
+    /// Returns the outcome, whatever answers that are still missing may be; `None` if they matter.
     fn outcome(&self, displacements: &[Option<f64>]) -> Option<Outcome> {
         let Job {
             may_win, given_up, ..
@@ -558,8 +550,7 @@ impl<'a> Candidate<'a> {
             .collect()
     }
 
-    /// Counts known rollouts in their order, whichever ended first. Each is counted once, since
-    /// counting goes through all images.
+    /// Counts known rollouts in their order, each once, whichever ended first.
     fn count(&self, rollouts: &mut Progress) {
         let is_over = |rollouts: &Progress| {
             self.early_stop && rollouts.unstable.is_some()
@@ -625,8 +616,7 @@ mod tests {
     use crate::task::perturbation::{PerturbedSetting, Sizes, condition};
     use std::collections::BTreeSet;
 
-    /// A sensor that expands at both ends: under a bright image it is wider than
-    /// `Physics::blow_up_extent` allows here.
+    /// Its sensors expand at both ends: under a bright image it exceeds `blow_up_extent`.
     fn body() -> Body {
         let row = [
             Material::SensorExpand,

@@ -16,9 +16,8 @@ pub enum Group {
 /// Fewest images under which a response is measured: two pairs in each condition.
 pub(crate) const LEAST_IMAGES: usize = 8;
 
-/// Margin at which an answer is as good as can be, for [`Fitness::MeanClipped`] \[voxel lengths\].
-/// With less, a small change flips many answers; with more, bodies that walk far count more than
-/// bodies that are correct.
+/// Margin at which an answer is as good as can be \[voxel lengths\]. With less, a small change
+/// flips many answers; with more, bodies that walk far count more than those that are correct.
 pub(crate) const ENOUGH: f64 = 10.0;
 
 /// Larger than any rounding error of a sum over images.
@@ -153,8 +152,7 @@ pub(crate) fn response_so_far(displacements: impl Iterator<Item = Option<f64>>) 
     (free > 0).then(|| linear.signum() * linear.abs().sqrt() - OFFSET_COST * anyway)
 }
 
-/// Returns the response of all pairs. It is infinite while a displacement is missing, since that
-/// may have any value, and without any pair.
+/// Returns the response of all pairs: infinite without any, or while a displacement is missing.
 fn response(displacements: impl Iterator<Item = Option<f64>> + Clone) -> f64 {
     let mut all = displacements.clone().peekable();
     if all.peek().is_none() || all.any(|displacement| displacement.is_none()) {
@@ -163,8 +161,7 @@ fn response(displacements: impl Iterator<Item = Option<f64>> + Clone) -> f64 {
     response_so_far(displacements).unwrap_or(0.0)
 }
 
-/// Returns the group's number and the margin of each answer if group A should walk right; if it
-/// should walk left, the margins are their negatives.
+/// Returns the group's number and the margin of each answer if A walks right; negate for left.
 pub(super) fn margins(
     answers: impl Iterator<Item = (Group, Option<f64>)> + Clone,
 ) -> impl Iterator<Item = (usize, Option<f64>)> + Clone {
@@ -177,8 +174,7 @@ pub(super) fn margins(
     })
 }
 
-/// Returns the number of images of each group, and the weight of one of them: exactly 1 if both
-/// have as many, or one has none.
+/// Returns the images of each group, and one's weight: exactly 1 for equal numbers or one group.
 pub(super) fn weights(
     margins: impl Iterator<Item = (usize, Option<f64>)>,
 ) -> ([usize; 2], [f64; 2]) {
@@ -200,7 +196,6 @@ fn smaller(x: f64, y: f64) -> f64 {
     if y < x || y.is_nan() { y } else { x }
 }
 
-/// Returns the fitness of the fitter assignment.
 pub(super) fn better((x, y): Assignments) -> f64 {
     // + 0.0 makes −0 a 0, so that equal numbers have the same text in files.
     (if x >= y { x } else { y }) + 0.0
@@ -239,8 +234,7 @@ mod tests {
         // Half differences 3, 2, −1, −2; half sums 0, 0, 10 and 10, 5 on average.
         let pairs = [3.0, -3.0, 12.0, 8.0, -1.0, 1.0, 8.0, 12.0];
         assert_eq!(response(&pairs), 4.5_f64.sqrt() - 5.0 / 8.0);
-        // The direction does not matter; the distance walked anyway costs; differences between
-        // conditions add nothing.
+        // The direction and differences between conditions do not matter; the offset costs.
         assert_eq!(response(&pairs.map(|d| -d)), 4.5_f64.sqrt() - 5.0 / 8.0);
         assert_eq!(
             response(&[3.0, -3.0, 2.0, -2.0, -1.0, 1.0, -2.0, 2.0]),

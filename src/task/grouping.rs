@@ -19,7 +19,6 @@ pub struct ClassSplit {
 }
 
 impl ClassSplit {
-    /// Returns the classes of a group.
     pub(crate) fn classes(&self, group: Group) -> &[u8] {
         match group {
             Group::A => &self.a,
@@ -34,8 +33,7 @@ impl ClassSplit {
             .find(|g| self.classes(*g).contains(&class))
     }
 
-    /// Returns true if every class is in one group: no recognition task, but the bin of robots that
-    /// always walk one way.
+    /// True if all classes are in one group: the bin of robots that always walk one way.
     pub(crate) fn is_same_way(&self) -> bool {
         self.b.is_empty()
     }
@@ -48,8 +46,7 @@ impl ClassSplit {
         groups_text([&self.a, &self.b], "|")
     }
 
-    /// Returns true if a name from a file is its name. Older files lack the comma at the end:
-    /// there, a name means the one of its run's groups that has it.
+    /// True if a file's name is its name; older files lack the comma at the end.
     pub(crate) fn is_called(&self, name: &str) -> bool {
         let own = self.name();
         own == name || own.strip_suffix(',') == Some(name)
@@ -87,16 +84,12 @@ pub struct Groups {
 }
 
 impl Groups {
-    /// Returns the classes of both groups.
     pub(crate) fn classes(&self) -> &[Vec<u8>; 2] {
         &self.classes
     }
 
-    /// Checks that the text means nothing else with these classes: `1|26` without a comma may mean
-    /// a class 26 if there is one.
-    ///
-    /// # Errors
-    /// Returns [`Ambiguous`] if it may.
+    /// Checks that the text means nothing else: `1|26` without a comma may mean a class 26 if there
+    /// is one.
     pub(crate) fn check_among(&self, there: &[u8]) -> Result<(), Ambiguous> {
         let number = |group: &Vec<u8>| -> Option<u8> {
             let digits: String = group.iter().map(u8::to_string).collect();
@@ -215,25 +208,18 @@ pub struct Grouping {
 /// Most classes to split in all ways: ten have 511 splits.
 pub(crate) const MAX_CLASSES: usize = 10;
 
-/// The reason why classes cannot be grouped.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum GroupingError {
-    /// A group has no classes.
     #[error("expected two groups with at least one class each, as in [[0], [1, 2]]; one is empty")]
     EmptyGroup,
-    /// A class occurs more than once.
     #[error("class {0} occurs more than once, expected every class in one group only")]
     Repeated(u8),
-    /// There are too few or too many classes for all splits.
     #[error("expected 2 to {MAX_CLASSES} classes to split in all ways, found {0}")]
     Classes(usize),
 }
 
 impl Grouping {
     /// Makes one task: the classes of `a` walk one way, those of `b` the other.
-    ///
-    /// # Errors
-    /// Returns a [`GroupingError`] if a group is empty or a class occurs twice.
     pub(crate) fn two_groups(a: &[u8], b: &[u8]) -> Result<Self, GroupingError> {
         if a.is_empty() || b.is_empty() {
             return Err(GroupingError::EmptyGroup);
@@ -253,9 +239,6 @@ impl Grouping {
     /// Small first groups come first, equally large ones in the order of the classes. (For 0, 1, 2,
     /// 3: 0|123, 1|023, 2|013, 3|012, 01|23, 02|13, 03|12.) With `same_way_bin`, "all the same way"
     /// is an additional last task.
-    ///
-    /// # Errors
-    /// Returns a [`GroupingError`] for repeated classes, or for other than 2 to [`MAX_CLASSES`].
     pub(crate) fn all_splits(classes: &[u8], same_way_bin: bool) -> Result<Self, GroupingError> {
         let k = classes.len();
         if !(2..=MAX_CLASSES).contains(&k) {
@@ -302,12 +285,10 @@ impl Grouping {
         &self.tasks
     }
 
-    /// Returns true if "all the same way" is a task.
     pub(crate) fn has_same_way_bin(&self) -> bool {
         self.tasks.iter().any(ClassSplit::is_same_way)
     }
 
-    /// Returns true if every way to split the classes is a task.
     pub(crate) fn has_all_splits(&self) -> bool {
         let classes = self.tasks.first().map_or(0, |s| s.a.len() + s.b.len());
         let splits = self.tasks.iter().filter(|s| !s.is_same_way()).count();

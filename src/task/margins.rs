@@ -109,7 +109,6 @@ impl<'de> Deserialize<'de> for Margins {
     }
 }
 
-/// Reads either notation.
 struct Reader;
 
 impl<'de> Visitor<'de> for Reader {

@@ -9,11 +9,9 @@ use crate::task::grouping::Grouping;
 use crate::task::perturbation::Condition;
 use std::borrow::Cow;
 
-/// The objective of evolution: which body is simulated for a candidate, under which images, and what
-/// its fitness counts. The loop of MAP-Elites is the same for all of them.
+/// The objective of evolution: what is simulated for a candidate, and what its fitness counts.
 pub(crate) trait Objective: Sync {
-    /// Returns the images and conditions of a run's evaluations, given its training images as
-    /// sensors see them (each H × W, in \[0, 1\]).
+    /// Returns images and conditions, given the training images as sensors see them, in \[0, 1\].
     fn prepare(
         &self,
         stimuli: Vec<Grid<f64>>,
@@ -21,7 +19,6 @@ pub(crate) trait Objective: Sync {
         seed: u64,
     ) -> (Vec<Grid<f64>>, Vec<Condition>);
 
-    /// Returns the body that is simulated for a candidate's.
     fn simulated<'b>(&self, body: &'b Body) -> Cow<'b, Body>;
 
     /// Returns the key by which a candidate's body counts as evaluated.
@@ -29,18 +26,14 @@ pub(crate) trait Objective: Sync {
         key(&self.simulated(body))
     }
 
-    /// Returns true if evaluating a known body again could change the archive.
     fn may_repeat(&self) -> bool;
 
-    /// Returns the factor by which a body's fitness is multiplied.
     fn factor(&self, body: &Body) -> f64;
 
-    /// Returns the order of the images, given the answers of the candidate's parent; empty for
-    /// their own order.
+    /// Returns the order of the images, given the parent's answers; empty for their own order.
     fn order(&self, grouping: &Grouping, of_parent: Option<&[Answer]>) -> Vec<usize>;
 
-    /// Returns what ends an evaluation early, given the fitness that the candidate must exceed for
-    /// each task (`None`: any will do).
+    /// Returns what ends an evaluation early, given the fitness to exceed on each task, if any.
     fn given_up(&self, to_beat: &[Option<f64>]) -> Option<Box<MayWin<'static>>>;
 }
 

@@ -59,14 +59,12 @@ impl PerturbationKind {
         PerturbationKind::Pixel,
     ];
 
-    /// Returns true if it changes the simulated world. The others change only how that is computed,
-    /// or how images are presented: a robot that fails under those exploits something other than
-    /// body and image.
+    /// True if it changes the simulated world. A robot that fails under the others, which change
+    /// only computation or presentation, exploits something other than body and image.
     pub(crate) fn is_of_the_world(self) -> bool {
         self >= PerturbationKind::Stiffness
     }
 
-    /// Returns its name for people.
     pub(crate) fn name(self) -> &'static str {
         match self {
             PerturbationKind::Start => "start",
@@ -114,16 +112,11 @@ impl Default for Sizes {
     }
 }
 
-/// A robot and the settings of its simulation.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PerturbedSetting {
-    /// Its body.
     pub(crate) body: Body,
-    /// The simulator's constants.
     pub(crate) physics: Physics,
-    /// The presentation of images.
     pub(crate) protocol: Protocol,
-    /// The stimulus of each image.
     pub(crate) stimuli: Vec<Grid<f64>>,
 }
 
@@ -181,9 +174,8 @@ impl ByTurns {
 /// Number of conditions of [`of_response`].
 pub(crate) const CONDITIONS_OF_RESPONSE: usize = 2;
 
-/// Returns the conditions under which the response of gaits is measured during evolution, in turn:
-/// the default; and a start raised by a row, without length limits. So luck at the first touch of
-/// the ground, or at a limit, does not count as a response.
+/// Returns the conditions of measuring a response, in turn: the default; a start raised by a row,
+/// without length limits. So luck at the ground or at a limit does not count.
 pub(crate) fn of_response() -> [Condition; CONDITIONS_OF_RESPONSE] {
     [condition(0, false), condition(1, true)]
 }
@@ -363,7 +355,6 @@ impl Perturbation {
         PerturbationKind::ALL.into_iter().flat_map(of).collect()
     }
 
-    /// Returns the kind of the change.
     pub(crate) fn kind(&self) -> PerturbationKind {
         match self {
             Perturbation::Start { .. } => PerturbationKind::Start,
@@ -405,14 +396,12 @@ impl Perturbation {
         }
     }
 
-    /// Returns false if instability does not count against the robot: without limits. Every
-    /// material has a limit, and a body that needs one does not exploit it.
+    /// True except without limits: a body that needs its materials' limits exploits nothing.
     pub(crate) fn counts_if_unstable(&self) -> bool {
         *self != Perturbation::NoLengthLimits
     }
 
-    /// Returns the changed setting. Compare displacements under it only after
-    /// [`Perturbation::undo`].
+    /// Returns the changed setting; see [`Perturbation::undo`] before comparing.
     pub(crate) fn apply(&self, setting: &PerturbedSetting) -> PerturbedSetting {
         let PerturbedSetting {
             body,
@@ -433,7 +422,6 @@ impl Perturbation {
         }
     }
 
-    /// Returns the changed body.
     pub(crate) fn body(&self, body: &Body) -> Body {
         if *self == Perturbation::Mirror {
             body.mirrored()
@@ -442,7 +430,6 @@ impl Perturbation {
         }
     }
 
-    /// Returns the changed constants of the simulator.
     pub(crate) fn physics(&self, physics: &Physics) -> Physics {
         match *self {
             Perturbation::TimeStep { divisor } => physics.refined(divisor),
@@ -468,7 +455,6 @@ impl Perturbation {
         }
     }
 
-    /// Returns the changed presentation of images.
     pub(crate) fn protocol(&self, protocol: &Protocol) -> Protocol {
         match *self {
             Perturbation::Start { rows } => Protocol {
@@ -491,8 +477,7 @@ impl Perturbation {
         }
     }
 
-    /// Returns displacements in the unperturbed frame: a mirrored walk is mirrored back, and the
-    /// order is the unchanged one.
+    /// Returns displacements in the unperturbed frame: mirrored back, in the unchanged order.
     pub(crate) fn undo(&self, mut displacements: Vec<f64>) -> Vec<f64> {
         match self {
             Perturbation::Mirror => displacements.iter_mut().for_each(|d| *d = -*d),

@@ -20,7 +20,6 @@ pub struct LabelledStimulus {
 pub struct Phase {
     /// Index in [`Recording::frames`] of the frame before the phase's first control step.
     pub(crate) first_frame: usize,
-    /// The image.
     pub(crate) seen: LabelledStimulus,
     /// X displacement of the centre of mass over the phase, voxel lengths, right positive.
     pub displacement: f64,
@@ -53,7 +52,6 @@ pub struct VoxelCorners {
 pub struct Recording {
     /// The robot's id or name.
     pub(crate) robot: String,
-    /// Its body.
     pub(crate) body: Body,
     /// Its voxels with their corners, row-major; fixed for the rollout.
     pub voxels: Vec<VoxelCorners>,

@@ -61,9 +61,6 @@ impl<'a> Rollout<'a> {
     }
 
     /// Acts as [`Rollout::show`] without a watcher, unless `stop` is set in the meantime.
-    ///
-    /// # Errors
-    /// Returns a [`StepError`] if it was stopped, or if the rollout became unstable.
     pub(crate) fn show_unless(
         &mut self,
         stimulus: &Grid<f64>,
@@ -82,18 +79,11 @@ impl<'a> Rollout<'a> {
         self.begin = self.world.centre_of_mass()[0];
     }
 
-    /// Simulates one control step.
-    ///
-    /// # Errors
-    /// Returns [`Unstable`] if the rollout ends in this step.
     pub(crate) fn step(&mut self) -> Result<(), Unstable> {
         self.world.step()
     }
 
     /// Simulates one control step; returns soon after `stop` is set.
-    ///
-    /// # Errors
-    /// Returns a [`StepError`] if it was stopped, or if the rollout became unstable.
     pub(crate) fn step_unless(&mut self, stop: &AtomicBool) -> Result<(), StepError> {
         self.world.step_unless(stop)
     }
@@ -103,7 +93,6 @@ impl<'a> Rollout<'a> {
         voxel_lengths(self.world.centre_of_mass()[0] - self.begin, self.physics())
     }
 
-    /// Returns the current frame, for pictures.
     pub(crate) fn frame(&self) -> Frame {
         let physics = self.physics();
         let ground = f64::from(physics.ground_row) * physics.cell_size;
@@ -129,7 +118,6 @@ impl<'a> Rollout<'a> {
         self.world.voxels().map(corner).collect()
     }
 
-    /// Returns to the initial state: a fresh rollout.
     pub(crate) fn reset(&mut self) {
         self.world.reset();
     }
@@ -190,9 +178,6 @@ pub fn fresh_rollouts_of(
 
 /// Simulates the images by the protocol, in fresh rollouts or one, unless `stop` is set in the
 /// meantime. Returns the displacements in voxel lengths, and, if `measured`, the energies put in.
-///
-/// # Errors
-/// Returns a [`StepError`] if it was stopped, or if a rollout became unstable.
 pub(crate) fn walk(
     system: &Arc<System>,
     protocol: &Protocol,
@@ -214,8 +199,7 @@ pub(crate) fn walk(
     Ok((displacements, rollout.world.energy()))
 }
 
-/// Returns for each stimulus the index of the first one that gives the body's sensors the same
-/// pixels: those share a rollout.
+/// Returns for each stimulus the first with the same pixels under sensors: those share a rollout.
 pub(crate) fn same_to_sensors(body: &Body, stimuli: &[&Grid<f64>]) -> Vec<usize> {
     let sensors = || {
         body.voxels()

@@ -11,7 +11,6 @@ use crate::task::fitness::Group;
 use crate::task::fitness::{Fitness, better};
 use crate::task::grouping::{ClassSplit, Grouping};
 
-/// The task that a robot performs, and its fitness there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Score {
     /// Index in [`Grouping::tasks`].
@@ -27,8 +26,7 @@ pub fn two_group_fitness(answers: &[(Group, f64)]) -> f64 {
 }
 
 impl Grouping {
-    /// Returns the fitness on a task, or an **upper bound** of it while some answers are missing.
-    /// Images of classes in neither of its groups do not count.
+    /// Returns the fitness on a task, or an **upper bound** while answers are missing.
     pub(crate) fn fitness_on(&self, split: &ClassSplit, answers: &[Answer]) -> f64 {
         better(
             self.fitness()
@@ -36,12 +34,10 @@ impl Grouping {
         )
     }
 
-    /// Returns the task that a robot performs, which is the one it is fittest on (the first wins a
-    /// tie), and its fitness there.
-    ///
-    /// With one image per class and the smallest margin this is the paper's rule: fitness is min
-    /// |d|, and the signs determine the task. A robot that walks the same way for all classes goes
-    /// to that bin with min |d| if there is one, else to its best split, with a negative fitness.
+    /// Returns the task that a robot is fittest on (the first wins a tie), and its fitness there.
+    /// With one image per class and the smallest margin this is the paper's rule, min |d|, and the
+    /// signs determine the task. Walking the same way for all classes goes to that bin with min |d|
+    /// if there is one, else to the best split, with a negative fitness.
     pub(crate) fn score(&self, answers: &[Answer]) -> Score {
         let mut best = Score {
             task: 0,
@@ -102,9 +98,8 @@ impl Grouping {
         turns.into_iter().map(|(_, image)| image).collect()
     }
 
-    /// Returns true if the robot's fitness will surely be 0 or more, so that no task it is bound to
-    /// fail can be its own. With one image per class every set of directions is some split's, or
-    /// the same way for all.
+    /// True if the fitness will surely be 0 or more: with one image per class every set of
+    /// directions is some split's, or the same way for all.
     fn never_negative(&self, answers: &[Answer]) -> bool {
         let mut classes: Vec<u8> = answers.iter().map(|a| a.class).collect();
         let images = classes.len();

@@ -62,8 +62,7 @@ impl Default for StimulusParams {
 }
 
 impl StimulusParams {
-    /// Combines the parameters of several bodies: the first one's, with the least of all margins;
-    /// reduced by areas if these are not its own. `None` for no body.
+    /// Combines bodies' parameters: the first's, with all margins' least, and by areas if changed.
     pub(crate) fn together(all: impl IntoIterator<Item = StimulusParams>) -> Option<Self> {
         let least = |first: Self, other: Self| match first.margin.least(&other.margin) {
             own if own == first.margin => first,
@@ -91,10 +90,7 @@ impl StimulusParams {
         }
     }
 
-    /// Checks the level.
-    ///
-    /// # Errors
-    /// Returns [`StimulusError::Level`] if it is below 0, 1 or more, or NaN.
+    /// Checks that the level is in [0, 1).
     pub(crate) fn validate(&self) -> Result<(), StimulusError> {
         (0.0..1.0)
             .contains(&self.level)
@@ -236,9 +232,8 @@ fn strided(image: &Grid<u8>, height: usize, width: usize) -> Result<Grid<f64>, S
     }))
 }
 
-/// Reduces the image to a grid of another size by area-weighted means, 0 … 255. In units of
-/// 1/height of a pixel, a voxel is `image.height()` tall and a pixel `height`: all overlaps are
-/// whole numbers, and the division per voxel is the only rounding.
+/// Reduces the image to another size by area-weighted means, 0 … 255. In units of 1/height of a
+/// pixel, all overlaps are whole numbers, and the division per voxel is the only rounding.
 pub(crate) fn averaged(image: &Grid<u8>, height: usize, width: usize) -> Grid<f64> {
     let overlap = |voxel: usize, voxel_side: usize, pixel: usize, pixel_side: usize| {
         let end = ((voxel + 1) * voxel_side).min((pixel + 1) * pixel_side);

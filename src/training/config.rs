@@ -17,14 +17,10 @@ use crate::task::margins::Margins;
 use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::stimulus::StimulusParams;
 
-/// Least number of training images of a class.
 const LEAST_PER_CLASS: usize = 2;
 
 /// Builds the config of a training: that of the gaits' run with another task, perhaps another seed,
-/// and the keys in `set`.
-///
-/// # Errors
-/// Returns an error if the config is invalid, or sets something that a training fixes.
+/// and the keys in `set`, which must not set what a training fixes.
 pub(crate) fn config_of(
     of_walkers: &Config,
     groups: &[Vec<u8>; 2],
@@ -88,8 +84,7 @@ pub(crate) fn config_of(
     Ok(config)
 }
 
-/// Checks that designs are compared on an image of every class. The groups alternate; the first
-/// begins.
+/// Checks that designs are compared on an image of every class; groups alternate, the first begins.
 fn check_final_images(config: &Config, [a, b]: &[Vec<u8>; 2]) -> Result<(), Error> {
     let (found, least) = (
         config.train.final_images,
@@ -137,9 +132,8 @@ fn check_fixed_keys(config: &Config, asked: &Config) -> Result<(), Error> {
     }
 }
 
-/// Drops the margin inherited from the gaits' config if the new images have another size, unless
-/// `set` asks for it. `of_gaits` is the gaits' config; `their_data` is the dataset they were
-/// trained on.
+/// Drops the margin inherited from `of_gaits`, trained on `their_data`, if the new images have
+/// another size, unless `set` asks for it.
 pub(crate) fn with_fitting_margin(
     config: Config,
     their_data: &DatasetRef,
@@ -181,11 +175,8 @@ pub(crate) fn with_fitting_margin(
     }
 }
 
-/// Sets the number of training images to as many as validation leaves. If there are few, validation
-/// also uses fewer than configured. `before` holds the images the gaits were trained on.
-///
-/// # Errors
-/// Returns an error if too few images remain for training or validation.
+/// Sets the number of training images to as many as validation leaves; validation uses fewer if
+/// they are few. `before` holds the images the gaits were trained on.
 pub(crate) fn with_images(
     config: Config,
     before: &[usize],
@@ -224,10 +215,7 @@ pub(crate) fn with_images(
     Ok(config)
 }
 
-/// Checks that the text of two groups is unambiguous given the classes of a dataset.
-///
-/// # Errors
-/// If it is ambiguous, the error says what to write.
+/// Checks that two groups are unambiguous given a dataset's classes; the error says what to write.
 pub(crate) fn check_groups(groups: &Groups, dataset: &Dataset) -> Result<(), Error> {
     let there = dataset.classes(Split::Train);
     groups
@@ -236,9 +224,6 @@ pub(crate) fn check_groups(groups: &Groups, dataset: &Dataset) -> Result<(), Err
 }
 
 /// Checks before a run evolves that its gaits can later be trained on these groups.
-///
-/// # Errors
-/// Returns an error if the config or the available images do not allow it.
 pub(crate) fn check(
     evolved: &Config,
     groups: &[Vec<u8>; 2],

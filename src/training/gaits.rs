@@ -21,7 +21,6 @@ use crate::store::training::{Batch, Drawn, Elsewhere, Origin};
 use crate::task::protocol::{Protocol, RolloutMode};
 use std::collections::BTreeSet;
 
-/// A candidate gait and the robot it belongs to.
 pub(crate) struct Candidate<'a> {
     pub(crate) robot: &'a Robot,
     pub(crate) gait: Gait,
@@ -108,8 +107,7 @@ pub(crate) fn candidates<'a>(
     Ok(walkers)
 }
 
-/// Returns the rollouts of each gait that `morphcog response` measured, to save simulating them
-/// again. They are empty unless a file beside the run is valid for this training.
+/// Returns each gait's rollouts by `morphcog response`; empty unless valid for this training.
 pub(crate) fn measured(
     source: &StoredRun,
     config: &Config,
@@ -174,7 +172,6 @@ pub(crate) fn key(
 }
 
 impl Elsewhere {
-    /// Returns the training images of a run.
     fn of(run: &RunFile) -> Self {
         let config = &run.config;
         let before = run

@@ -22,8 +22,7 @@ use std::time::{Duration, Instant};
 /// Interval at which rollouts are saved. A power cut loses at most this much work.
 const SAVE_EVERY: Duration = Duration::from_secs(5);
 
-/// Rollouts per thread between two checks of the time to save. With fewer, threads wait for each
-/// other more often, and fewer rollouts are simulated side by side.
+/// Rollouts per thread between two looks at the time to save. With fewer, threads wait more often.
 const PART: usize = 128;
 
 /// The rollouts simulated in this session and in earlier ones.
@@ -38,7 +37,6 @@ pub(crate) struct Log<'a> {
     saved: (usize, Instant),
     /// Rollouts completed in the current work; `None` if its progress has another unit.
     done: Option<AtomicU64>,
-    /// True if anything was simulated since the last check.
     pub(crate) has_simulated: Arc<AtomicBool>,
     pub(crate) session: &'a Session<'a>,
 }

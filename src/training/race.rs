@@ -19,21 +19,18 @@ use crate::sim::{Physics, width};
 use crate::task::fitness::clipped_margin;
 use crate::training::rollouts::{Image, Rollouts};
 
-/// Images in a challenger's first look; each next look takes twice as many. With fewer, good
-/// challengers are dropped by chance; with more, bad ones cost more.
+/// Images in the first look, then twice as many. Fewer drop good challengers; more cost time.
 const FIRST_LOOK: usize = 24;
 
 /// Standard errors by which the mean gain to come may exceed that so far. Larger values drop
 /// challengers later: with 2, three in four of a hard task (3|012) need all 400 images.
 const ERRORS_OF_HOPE: f64 = 1.0;
 
-/// Standard errors by which a challenger must be better. Any change of a body reshuffles its
-/// answers near the boundary, so many worse bodies look better on a few hundred images. With 0,
-/// they won by chance.
+/// Standard errors by which a challenger must be better. Any change reshuffles answers near the
+/// boundary: with 0, worse bodies won by chance.
 const ERRORS_TO_WIN: f64 = 1.0;
 
-/// Spread added to that of gains, which few images may understate. Without it, a challenger that
-/// first answers exactly like the champion is taken for its twin.
+/// Added to the spread of gains: who first answers like the champion is not taken for its twin.
 const DOUBT: f64 = 0.05;
 
 /// Fraction of challengers that differ in voxels of any material; the others differ in sensors.
@@ -54,19 +51,14 @@ const DRAWS: usize = 1000;
 /// A training image of a refinement.
 #[derive(Clone, Debug)]
 pub(crate) struct WeightedImage {
-    /// Pixels at the voxels.
     pub(crate) stimulus: Grid<f64>,
-    /// Number of its condition.
     pub(crate) condition: usize,
-    /// Correct direction: 1 right, −1 left.
     pub(crate) right: f64,
-    /// Weight in the fitness.
     pub(crate) weight: f64,
 }
 
 impl WeightedImage {
-    /// Prepares images for a robot whose first group walks to this side: 1 right, −1 left. Both
-    /// groups have the same total weight, however many images each has.
+    /// Prepares images; the first group walks to `side`: 1 right, −1 left. Both weigh the same.
     pub(crate) fn all(images: &[&Image], side: f64) -> Vec<Self> {
         let of = |right: f64| {
             images
@@ -85,18 +77,14 @@ impl WeightedImage {
     }
 }
 
-/// The result of a challenge.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Challenge {
-    /// Its number, from 1.
     pub(crate) number: usize,
     /// True if the challenger has another gait than the champion.
     pub(crate) other_gait: bool,
     /// Number of images the challenger was evaluated on.
     pub(crate) shown: usize,
-    /// The champion's fitness afterwards.
     pub(crate) fitness: f64,
-    /// True if the challenger became champion.
     pub(crate) won: bool,
 }
 
@@ -108,8 +96,7 @@ pub(crate) struct Refinement<'a> {
     seed: u64,
     body: Body,
     displacements: Vec<f64>,
-    /// Evidence of the slopes of all cells of the grid, row-major; none for cells that are not
-    /// places.
+    /// Evidence of the slopes of all cells, row-major; none for cells that are no places.
     evidence: Evidence,
     ridge: f64,
     challenges: usize,
@@ -119,9 +106,6 @@ pub(crate) struct Refinement<'a> {
 impl<'a> Refinement<'a> {
     /// Evaluates the first champion on all images. `evidence` covers all cells of its grid,
     /// row-major.
-    ///
-    /// # Errors
-    /// Returns the error of the rollouts.
     pub(crate) fn new<R: Rollouts>(
         body: Body,
         images: Vec<WeightedImage>,
@@ -145,15 +129,11 @@ impl<'a> Refinement<'a> {
         })
     }
 
-    /// Returns the champion.
     pub(crate) fn body(&self) -> &Body {
         &self.body
     }
 
     /// Evaluates the champion on other images, on which challengers are compared from now on.
-    ///
-    /// # Errors
-    /// Returns the error of the rollouts.
     pub(crate) fn show<R: Rollouts>(
         &mut self,
         images: Vec<WeightedImage>,
@@ -170,7 +150,6 @@ impl<'a> Refinement<'a> {
         &self.displacements
     }
 
-    /// Returns the number of rollouts so far.
     pub(crate) fn rollouts(&self) -> usize {
         self.rollouts
     }
@@ -191,9 +170,6 @@ impl<'a> Refinement<'a> {
     }
 
     /// Compares a challenger with the champion, which it replaces if it wins.
-    ///
-    /// # Errors
-    /// Returns the error of the rollouts.
     pub(crate) fn challenge<R: Rollouts>(
         &mut self,
         challenger: Body,
@@ -256,7 +232,6 @@ impl<'a> Refinement<'a> {
         })
     }
 
-    /// Proposes a challenger.
     pub(crate) fn challenger(&self) -> Body {
         let mut random = self.random(Use::Challenger);
         if random.unit() < OTHER_GAITS {
@@ -438,8 +413,7 @@ mod tests {
     use super::*;
     use std::convert::Infallible;
 
-    /// Bodies of one row that walk by the widths of their soft voxels and sensors; the first has
-    /// the largest slope.
+    /// Bodies of one row that walk by their places' widths; the first has the largest slope.
     struct Planted {
         physics: Physics,
         simulated: usize,
@@ -500,8 +474,7 @@ mod tests {
         }
     }
 
-    /// Refines a body of soft voxels; returns the champion, the fitness after each challenge, and
-    /// the number of rollouts.
+    /// Refines soft voxels; returns champion, fitness after each challenge, number of rollouts.
     fn refined(challengers: usize) -> (Body, Vec<f64>, usize) {
         let (mut rollouts, physics) = (planted(), Physics::default());
         let evidence = (Evidence::new(PLACES), 1.0);

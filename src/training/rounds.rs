@@ -18,8 +18,7 @@ use crate::training::race::{Challenge, Refinement, WeightedImage};
 use crate::training::rollouts::{Image, Rollouts};
 use std::collections::BTreeSet;
 
-/// Weight of rollouts with random images, relative to those around the latest design. They are
-/// farther from it, but there are more, and each carries more information about the slopes.
+/// Weight of random rollouts: farther from the design, but more, and each tells more of the slopes.
 const RANDOM_WEIGHT: f64 = 0.3;
 
 /// Factor on the weight of a round's rollouts in every later round. With less, slopes are noisy;
@@ -33,14 +32,11 @@ const CHANGED: f64 = 0.15;
 /// Most designs of earlier rounds that challenge the last one when refining begins.
 const FINALISTS: usize = 4;
 
-/// Challengers compared on the same images. With more, some win by chance on these; with fewer,
-/// evaluating the champion on other images costs more.
+/// Challengers on the same images. With more, some win by chance; fewer cost more evaluations.
 const CHALLENGERS_OF_A_SET: usize = 30;
 
-/// The settings of a training.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TrainingPlan {
-    /// Seed of all random numbers.
     pub(crate) seed: u64,
     /// Rounds that measure the response around a design; 0: the robot keeps its own design.
     pub(crate) rounds: usize,
@@ -54,17 +50,14 @@ pub(crate) struct TrainingPlan {
     pub(crate) min_muscles: usize,
 }
 
-/// The results of a round.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Round {
-    /// Its number, from 1.
     pub(crate) round: usize,
     /// Predicted mean clipped margin of the design's answers to all training images.
     pub(crate) predicted: f64,
     /// Mean clipped margin of its answers to the images of the round.
     pub(crate) measured: f64,
-    /// Mean difference of the displacements from the prediction; positive to the right \[voxel
-    /// lengths\].
+    /// Mean of displacement minus prediction \[voxel lengths\], positive to the right.
     pub(crate) off: f64,
     /// Number of places that change in the next design.
     pub(crate) changed: usize,
@@ -72,19 +65,15 @@ pub(crate) struct Round {
     pub(crate) rollouts: usize,
 }
 
-/// The beginning of a training.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum First {
-    /// The results of the first round.
     Round(Round),
     /// Mean clipped margin of the robot's own design, where there are no rounds.
     Own(f64),
 }
 
-/// A trained design.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TrainedDesign {
-    /// The body.
     pub(crate) body: Body,
     /// Numbers of the training images on which it was evaluated at the end.
     pub(crate) shown: Vec<usize>,
@@ -175,9 +164,6 @@ impl<'a> GaitTrainer<'a> {
     }
 
     /// Begins: with the first round, or, without rounds, with the robot's own design.
-    ///
-    /// # Errors
-    /// Returns the error of the rollouts.
     pub(crate) fn first<R: Rollouts>(&mut self, rollouts: &mut R) -> Result<First, R::Error> {
         match self.plan.rounds {
             0 => self.own(rollouts).map(First::Own),
@@ -186,9 +172,6 @@ impl<'a> GaitTrainer<'a> {
     }
 
     /// Measures the response around the design, and solves the design problem again.
-    ///
-    /// # Errors
-    /// Returns the error of the rollouts.
     pub(crate) fn round<R: Rollouts>(&mut self, rollouts: &mut R) -> Result<Round, R::Error> {
         self.rounds += 1;
         let mut random = self.random(Use::Round, self.rounds as u64);
@@ -209,11 +192,8 @@ impl<'a> GaitTrainer<'a> {
         Ok(round)
     }
 
-    /// Takes the robot's own design and the side that suits it in place of a solution, and measures
-    /// the response around it. Returns its mean clipped margin.
-    ///
-    /// # Errors
-    /// Returns the error of the rollouts.
+    /// Takes the robot's own design and its better side for a solution, and measures the response
+    /// around it. Returns its mean clipped margin.
     fn own<R: Rollouts>(&mut self, rollouts: &mut R) -> Result<f64, R::Error> {
         self.design = self.gait.design();
         let (measured, _) = self.measured(&mut self.random(Use::Round, 0), rollouts)?;
@@ -223,8 +203,7 @@ impl<'a> GaitTrainer<'a> {
         Ok(measured.abs())
     }
 
-    /// Measures the response around the design under training images. Returns the mean clipped
-    /// margin of its answers, and the mean difference of the displacements from the prediction.
+    /// Measures the response around the design; returns its mean clipped margin and its mean `off`.
     fn measured<R: Rollouts>(
         &mut self,
         random: &mut Stream,
@@ -233,8 +212,7 @@ impl<'a> GaitTrainer<'a> {
         let numbers = self.drawn(self.plan.images, random);
         let draw = |(turn, number): (usize, &usize)| {
             let material = |material: &Material| {
-                // Half of the rollouts use the design itself; the groups alternate, so both have as
-                // many. Soft voxels stay soft: all rollouts are of one body.
+                // Half use the design itself, in both groups. Soft stays soft: all are of one body.
                 if turn / 2 % 2 == 1 && *material != Material::Soft && random.unit() < CHANGED {
                     SENSORS[random.below(SENSORS.len())]
                 } else {
@@ -289,9 +267,6 @@ impl<'a> GaitTrainer<'a> {
 
     /// Compares the last designs on the same training images, and refines the best by challengers.
     /// `told` is called after each challenge.
-    ///
-    /// # Errors
-    /// Returns the error of the rollouts.
     pub(crate) fn finish<R: Rollouts>(
         self,
         rollouts: &mut R,
@@ -370,8 +345,7 @@ impl<'a> GaitTrainer<'a> {
         stream(self.plan.seed, Purpose::Training, what as u64, number)
     }
 
-    /// Draws `count` different training images, or all. The groups alternate while both have
-    /// images.
+    /// Draws `count` different training images, or all; groups alternate while both have images.
     fn drawn(&self, count: usize, random: &mut Stream) -> Vec<usize> {
         let of = |right: f64| -> Vec<usize> {
             (0..self.images.len())
@@ -394,8 +368,7 @@ impl<'a> GaitTrainer<'a> {
         drawn
     }
 
-    /// Adds missing classes: a random image of each replaces the last image of its group whose
-    /// class has another.
+    /// Adds missing classes: each replaces its group's last image whose class has another.
     fn with_every_class(&self, mut numbers: Vec<usize>, random: &mut Stream) -> Vec<usize> {
         let classes: BTreeSet<u8> = self.images.iter().map(|image| image.class).collect();
         for class in classes {
@@ -448,8 +421,7 @@ impl<'a> GaitTrainer<'a> {
         means.iter().sum::<f64>() / means.len().max(1) as f64
     }
 
-    /// Solves the design problem from a design on; returns the predicted objective and the
-    /// solution.
+    /// Solves on from a design; returns the predicted objective and the solution.
     fn solved(
         &self,
         from: &[Material],
@@ -487,8 +459,7 @@ mod tests {
     use crate::response::regression::RandomRollout;
     use std::convert::Infallible;
 
-    /// A body that walks by the widths of its places with diminishing effect; its slopes depend a
-    /// little on the widths.
+    /// A body that walks by its widths with diminishing effect, on which slopes depend a little.
     struct Planted {
         gait: Gait,
         physics: Physics,
@@ -568,8 +539,7 @@ mod tests {
             Response::of(&(0..rollouts).map(&mut shown).collect::<Vec<_>>()).unwrap()
         }
 
-        /// Trains; returns the design, the rounds, and the accuracies of the first and the last
-        /// design.
+        /// Trains; returns the design, the rounds, and the first and last design's accuracies.
         fn taught(
             &mut self,
             images: usize,

@@ -21,15 +21,13 @@ use crate::task::margins::Margins;
 use crate::task::stimulus::{StimulusParams, stimulus};
 use rayon::prelude::*;
 
-/// Windows evaluated in parallel before the next are drawn. With more, windows near the best are
-/// drawn when it is known less well; with fewer, cores are idle.
+/// Windows evaluated in parallel. With more, the best is known less well; with fewer, cores idle.
 const BATCH: usize = 20;
 
 /// Most images by which windows are compared. More cost time and hardly change the best window.
 const IMAGES: usize = 1000;
 
-/// Image side divided by the least side of a window. With more, small windows show every voxel
-/// almost the same.
+/// Image side by a window's least side. With more, small windows show all voxels almost the same.
 const LEAST_SHARE: usize = 4;
 
 /// Most pixels by which an edge moves when the best window is improved.
@@ -42,7 +40,6 @@ pub(crate) struct Windows<'a> {
     config: &'a Config,
 }
 
-/// The best window found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Found {
     /// Margins outside the window.
@@ -55,9 +52,6 @@ pub(crate) struct Found {
 
 impl<'a> Windows<'a> {
     /// Takes at most 1000 of these training images, which are in the order of their classes.
-    ///
-    /// # Errors
-    /// Returns an error if an image is missing.
     pub(crate) fn of(
         config: &'a Config,
         dataset: &Dataset,
@@ -80,11 +74,7 @@ impl<'a> Windows<'a> {
     }
 
     /// Returns the window with the best prediction among the config's own, windows anywhere, and
-    /// windows near the best. `train.windows` is their number. `told` is called with the number
-    /// tried so far.
-    ///
-    /// # Errors
-    /// Returns [`Stopped`] if `stop` was set in the meantime.
+    /// near the best, `train.windows` in all. `told` is called with the number tried so far.
     pub(crate) fn best(
         &self,
         gait: &Gait,

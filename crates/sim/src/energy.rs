@@ -42,7 +42,6 @@ struct Spring {
 pub(crate) struct Meter {
     springs: Vec<Spring>,
     points: Vec<usize>,
-    /// Weight of a point.
     weight: f64,
     /// Goals of the current control step; empty before the first (lengths then).
     goals: Vec<f64>,

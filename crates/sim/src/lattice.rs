@@ -12,8 +12,7 @@ use crate::physics::Physics;
 use crate::simd::{BLOCK, Buffer};
 use std::ops::Range;
 
-/// Sides of a voxel in the order of visits: top, right, bottom, left. Each runs clockwise, so its
-/// outward normal is its direction turned left.
+/// Sides of a voxel as visited: top, right, bottom, left; clockwise, so the normal is to the left.
 pub(crate) const SIDES: [(usize, usize); 4] = [(0, 1), (1, 2), (2, 3), (3, 0)];
 
 /// Neighbouring cell across each side, in the order of [`SIDES`].
@@ -22,14 +21,12 @@ const ACROSS: [(isize, isize); 4] = [(-1, 0), (0, 1), (1, 0), (0, -1)];
 /// Number of spring families: horizontal, vertical, falling and rising diagonals.
 pub(crate) const FAMILIES: usize = 4;
 
-/// Returns the index of a slot's spring of a family in the arrays over all springs: by blocks of
-/// slots, then by families, so that a sweep over the slots reads them from front to back.
+/// Returns the index of a slot's spring: by blocks of slots, then by families, as sweeps read them.
 #[inline(always)]
 pub(crate) fn spring_index(slot: usize, family: usize) -> usize {
     (slot / BLOCK * FAMILIES + family) * BLOCK + slot % BLOCK
 }
 
-/// A spring with an end at an off-lattice point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OffLatticeSpring {
     pub ends: [usize; 2],
@@ -54,7 +51,6 @@ pub(crate) struct ActiveVoxel {
     pub place: (usize, usize),
 }
 
-/// A voxel with an exposed side.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SurfaceVoxel {
     pub row: usize,
@@ -157,8 +153,7 @@ impl Lattice {
             };
             let [tl, tr, br, bl] = corners;
             // Voxels come row-major, so a later one overwrites. A rigid one does so only where
-            // there is no spring yet (physics.md, "Points and springs": start from the rigid value,
-            // every non-rigid cell overwrites).
+            // there is no spring yet (physics.md, "Points and springs").
             let keep = material == Material::Rigid;
             let sides = [[tl, tr], [tr, br], [bl, br], [tl, bl]];
             for (ends, family) in sides.into_iter().zip([0, 1, 0, 1]) {
@@ -331,8 +326,7 @@ fn surface_voxels(body: &Body, voxels: &[((usize, usize), [usize; 4])]) -> Vec<S
     voxels.iter().filter_map(voxel).collect()
 }
 
-/// Groups links of the rigid pass that share no point, so that the processor can work on several at
-/// once. Links that share a point keep their order, so results are the same bits.
+/// Groups links of the rigid pass that share no point, for the processor; others keep their order.
 fn in_rounds(links: &[[usize; 2]], points: usize) -> Vec<[usize; 2]> {
     let mut taken = vec![0; points];
     let mut round = |&[a, b]: &[usize; 2]| {

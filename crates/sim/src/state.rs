@@ -19,7 +19,6 @@ pub(crate) fn slices([x, y]: &Pair, len: usize) -> [&[f64]; 2] {
     [&x[..len], &y[..len]]
 }
 
-/// Like [`slices`], but mutable.
 #[inline(always)]
 pub(crate) fn slices_mut([x, y]: &mut Pair, len: usize) -> [&mut [f64]; 2] {
     [&mut x[..len], &mut y[..len]]
@@ -65,7 +64,6 @@ impl State {
         }
     }
 
-    /// Returns true if both have the same number of slots.
     pub(crate) fn fits(&self, other: &State) -> bool {
         let lengths = |state: &State| {
             [&state.position, &state.velocity, &state.previous].map(|[x, y]| [x.len(), y.len()])

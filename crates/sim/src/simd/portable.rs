@@ -3,9 +3,8 @@
 use super::{Lanes, each};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
-/// Returns a · b + c, rounded once. Without an instruction for it at compile time, `libm` looks for
-/// one at run time or computes it in software. (`f64::mul_add` would call the C library's, which is
-/// not exact everywhere.)
+/// Returns a · b + c, rounded once: by `libm`, which looks for an instruction at run time, since
+/// the C library's (`f64::mul_add`) is not exact everywhere.
 #[inline(always)]
 #[allow(clippy::disallowed_methods, reason = "these are the lanes")]
 fn mul_add(a: f64, b: f64, c: f64) -> f64 {
@@ -16,11 +15,9 @@ fn mul_add(a: f64, b: f64, c: f64) -> f64 {
     }
 }
 
-/// Four lanes.
 #[derive(Clone, Copy)]
 pub(super) struct F64x4([f64; 4]);
 
-/// Mask of four lanes.
 #[derive(Clone, Copy)]
 pub(super) struct Mask([bool; 4]);
 

@@ -36,8 +36,7 @@ pub fn width(material: Material, pixel: f64, physics: &Physics) -> f64 {
     free.clamp(physics.target_min, physics.target_max)
 }
 
-/// Writes the goals of all actuated sides for a control step. `pixels` holds the pixel of each
-/// active voxel; `targets` is scratch memory of the same length.
+/// Writes all sides' goals. `pixels` is by active voxel; `targets` is scratch memory as long.
 pub(crate) fn set_goals(
     System { lattice, physics }: &System,
     control_step: u64,

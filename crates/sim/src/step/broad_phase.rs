@@ -17,9 +17,8 @@ use crate::unstable::UnstableReason;
 /// Distance that a point may move before the lists are rebuilt \[voxel lengths\].
 const BUDGET: f64 = 0.2;
 
-/// Most candidates per surface voxel. More are a heap of overlapping voxels, whatever
-/// `Physics::unstable_ratio` says: a substep would take seconds. A simulation that is stable with
-/// EvoGym's ratio stays far below.
+/// Most candidates per surface voxel. More are a heap of overlapping voxels, which would take
+/// seconds; stable simulations stay far below.
 const MOST_CANDIDATES: usize = 256;
 
 /// A corner of one surface voxel that may enter another.
@@ -47,7 +46,6 @@ pub(crate) struct BroadPhase {
     sides: [Buffer; 4],
 }
 
-/// Returns the position of a point.
 #[inline]
 pub(crate) fn place(point: usize, state: &State) -> Vector {
     Vector::new(state.position[X][point], state.position[Y][point])
@@ -216,7 +214,6 @@ impl BroadPhase {
         L::any(across & high_y.gt(bottom) & top.gt(low_y))
     }
 
-    /// Adds a surface voxel near another to the lists.
     fn add(&mut self, lattice: &Lattice, state: &State, [mover, host]: [usize; 2], slack: f64) {
         let (voxel, other) = (&lattice.surface[mover], &lattice.surface[host]);
         let apart = voxel

@@ -15,8 +15,7 @@ const FAR_ENDS: [[usize; 2]; 4] = [[1, 3], [0, 2], [3, 1], [2, 0]];
 /// A point this far out of a voxel's box \[wu\] is not inside, despite the exact test's rounding.
 const CLEAR: f64 = 1e-9;
 
-/// Most columns that a voxel spans: those of the widest that has not blown up, and room for its
-/// motion since the last check.
+/// Most columns that a voxel spans: the widest's, and room for motion since the last check.
 const MOST_COLUMNS: i64 = MOST_CELLS as i64 + 8;
 
 /// The edge of a voxel that pushes a point out.
@@ -60,8 +59,7 @@ fn nearest_edge(
     nearest
 }
 
-/// The force on a point that an edge pushes out, without the damping of the edge's own motion; and
-/// its two parts that act on the edge's ends: along the normal, and friction.
+/// The force on a point that an edge pushes out, without damping; its parts act on the edge's ends.
 struct Push {
     on_point: Vector,
     normal_force: f64,
@@ -96,7 +94,6 @@ fn reaction(edge: &Edge, push: &Push, velocity: Vector, physics: &Physics) -> Ve
     n * along + push.friction / 2.0
 }
 
-/// Adds all contact forces to `contact`.
 pub(crate) fn add_contacts(
     System { lattice, physics }: &System,
     start_column: i64,
@@ -171,8 +168,7 @@ impl Contacts<'_> {
         }
     }
 
-    /// Adds the contacts of a surface voxel with every ground cell whose box meets its own: its
-    /// corners in the ground, and the ground's corners in it.
+    /// Adds a surface voxel's contacts with every ground cell whose box meets its own, both ways.
     fn with_ground(&mut self, voxel: &SurfaceVoxel, start_column: i64) {
         let (physics, cell) = (self.physics, self.physics.cell_size);
         let (top, bottom) = (

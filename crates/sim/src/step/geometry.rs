@@ -121,8 +121,7 @@ pub(crate) fn inside(p: Vector, quad: &[Vector; 4]) -> bool {
     c * d >= 0.0 && c * e >= 0.0
 }
 
-/// Returns true if the segments a–b and p–q cross, ends included; segments with a cross product
-/// below `epsilon` count as parallel and never do.
+/// True if segments cross, ends included; parallels (cross product below `epsilon`) never do.
 #[inline]
 pub(crate) fn cross(a: Vector, b: Vector, p: Vector, q: Vector, epsilon: f64) -> bool {
     let (r, s, w) = (b - a, q - p, p - a);

@@ -11,7 +11,6 @@ use crate::step::series::{RANGE, TERMS, rsqrt_exact, rsqrt_series};
 use crate::step::springs::{Gather, squares, vectors};
 use crate::system::System;
 
-/// Limits of springs of one rest length.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limits {
     /// Squares of the least and greatest length.
@@ -60,8 +59,7 @@ pub(crate) enum Reach {
     Far,
 }
 
-/// Limits all springs at once: computes corrections from the same positions, then adds them up.
-/// `reach` is a guess from the substep before, then the case found; results do not depend on it.
+/// Limits all springs at once, on the same positions. `reach` is a guess that changes no result.
 #[inline(always)]
 pub(crate) fn limit_all<L: Lanes>(
     system: &System,
@@ -84,7 +82,6 @@ pub(crate) fn limit_all<L: Lanes>(
     }
 }
 
-/// Returns the widest case that the masks contain.
 #[inline(always)]
 fn reach<L: Lanes>(any: L::Mask, far: L::Mask) -> Reach {
     if L::any(far) {
@@ -96,7 +93,6 @@ fn reach<L: Lanes>(any: L::Mask, far: L::Mask) -> Reach {
     }
 }
 
-/// Returns the limits of each family's springs.
 #[inline(always)]
 fn limits(System { lattice, physics }: &System) -> [Limits; FAMILIES] {
     each!(i in [0, 1, 2, 3] => Limits::new(lattice.lengths[i], physics.limit_low, physics.limit_high))
@@ -175,8 +171,7 @@ fn limit_any<L: Lanes, const FAR: bool>(
     reach::<L>(others, far)
 }
 
-/// Limits the sides of rigid voxels one after the other, on current positions; a side shared by two
-/// voxels is visited twice.
+/// Limits rigid voxels' sides one by one, on current positions; shared sides are visited twice.
 pub(crate) fn limit_rigid(System { lattice, physics }: &System, [x, y]: &mut Pair) {
     let limits = Limits::new(
         physics.cell_size,
@@ -200,8 +195,7 @@ pub(crate) fn limit_rigid(System { lattice, physics }: &System, [x, y]: &mut Pai
     }
 }
 
-/// The rigid pass for several simulations of one system at once, one per lane, with the same bits
-/// as [`limit_rigid`] for each.
+/// The rigid pass for several simulations at once, one per lane, with [`limit_rigid`]'s bits.
 #[derive(Clone, Debug)]
 pub(crate) struct SharedRigidPass {
     /// Points of rigid sides.
@@ -311,7 +305,6 @@ impl SharedRigidPass {
     }
 }
 
-/// Applies [`shrink_scalar`] in every lane.
 #[inline(always)]
 fn shrink<L: Lanes>(t: L) -> L {
     let [c0, c1, c2, c3, c4, c5] = each!(i in [0, 1, 2, 3, 4, 5] => L::splat(TERMS[i]));

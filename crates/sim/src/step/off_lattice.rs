@@ -11,8 +11,7 @@ use crate::system::System;
 /// Number of off-lattice springs computed together.
 pub(crate) const GROUP: usize = FAMILIES * BLOCK;
 
-/// The off-lattice springs' part of a substep. Their ends are read and written one by one, but the
-/// work between is as wide as the lattice's.
+/// The off-lattice springs' part of a substep; only their ends are read and written one by one.
 #[derive(Clone, Debug)]
 pub(crate) struct OffLattice {
     /// Springs by groups.

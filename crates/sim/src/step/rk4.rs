@@ -16,8 +16,7 @@ use crate::step::off_lattice::OffLattice;
 use crate::step::springs::{Gather, Watch, squares, vectors};
 use crate::system::System;
 
-/// Advances velocities by one substep with constant contact forces, and leaves the new positions in
-/// `scratch`.
+/// Advances velocities with constant contact forces; leaves the new positions in `scratch`.
 #[inline(always)]
 pub(crate) fn integrate<L: Lanes>(system: &System, state: &mut State, scratch: &mut Scratch) {
     let System { lattice, physics } = system;
@@ -36,8 +35,7 @@ pub(crate) fn integrate<L: Lanes>(system: &System, state: &mut State, scratch: &
     std::mem::swap(&mut state.velocity, &mut scratch.velocity);
 }
 
-/// Limits the lengths of all springs at the new positions. The positions at the start of the
-/// substep become the previous ones.
+/// Limits all springs at the new positions; those at the substep's start become the previous ones.
 #[inline(always)]
 pub(crate) fn limit<L: Lanes>(system: &System, state: &mut State, scratch: &mut Scratch) {
     let Scratch {
@@ -56,8 +54,7 @@ pub(crate) fn limit<L: Lanes>(system: &System, state: &mut State, scratch: &mut 
 }
 
 /// Runs the other three stages. Unless `EXACT`, they assume that all is regular and return false if
-/// they must be repeated exactly. The first and the last stage detect that: between them springs
-/// hardly stretch, and points hardly fall, any further.
+/// they must be repeated exactly; the first and the last stage detect that.
 #[inline(always)]
 fn later_stages<L: Lanes, const EXACT: bool>(
     system: &System,
@@ -320,8 +317,7 @@ fn fourth_stage<L: Lanes, const EXACT: bool>(
     EXACT || watch.regular()
 }
 
-/// Lanes in memory. Their alignment matters beyond them: it makes the compiler align the stack.
-/// Otherwise the registers that it spills in the sweeps would straddle cache lines.
+/// Lanes in memory, aligned so that the registers spilled in sweeps straddle no cache lines.
 #[repr(align(64))]
 struct Aligned([[f64; BLOCK]; 4]);
 

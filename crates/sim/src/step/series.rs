@@ -5,10 +5,9 @@ use crate::simd::{Lanes, each};
 /// Greatest |t| for the series. Springs beyond it (well below one in 1000) need root and division.
 pub(crate) const RANGE: f64 = 1.0 / 64.0;
 
-/// The binomial series of (1 − 1/√(1 + t))/t up to t⁵. Most springs have t near 0, and some bodies
-/// amplify errors there. A fit that spreads later terms over these would lessen the greatest error
-/// and spoil that near 0. 1 − 1/√(1 + t) is off by at most 6e-14 anywhere in the range, and only by
-/// rounding for |t| up to 1/400.
+/// The binomial series of (1 − 1/√(1 + t))/t up to t⁵. Most springs have t near 0, where some
+/// bodies amplify errors and a fit would be worse. 1 − 1/√(1 + t) is off by at most 6e-14 anywhere
+/// in the range, and only by rounding for |t| up to 1/400.
 pub(crate) const TERMS: [f64; 6] = [
     1.0 / 2.0,
     -3.0 / 8.0,

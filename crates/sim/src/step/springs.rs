@@ -55,16 +55,14 @@ impl<L: Lanes> Watch<L> {
     }
 }
 
-/// A number for each slot of a block.
 pub(crate) type Wide = [f64; BLOCK];
 
 /// Data of four springs per slot of a block, kept from one substep to the next.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Springs {
-    /// 1/d₀ of the latest substep. Within a control step the next substep finds its own from it by
-    /// the series. The first substep of each control step starts from 0, out of the series' range,
-    /// and so from root and division: a simulation continued from its state gives the same bits.
+    /// 1/d₀ of the latest substep, from which the next finds its own by the series. 0 at the start
+    /// of a control step, hence root and division: a continued simulation gives the same bits.
     inverse_length: [Wide; FAMILIES],
     /// Stiffness per mass of a point, times the servo's gain \[1/s²\]; 0 where there is no spring.
     driven: [Wide; FAMILIES],
@@ -182,7 +180,6 @@ pub(crate) fn vectors<L: Lanes>(position: [&[f64]; 2], slot: usize, pitch: usize
     })
 }
 
-/// Returns the squared lengths of vectors.
 #[inline(always)]
 pub(crate) fn squares<L: Lanes>([x, y]: &Vectors<L>) -> [L; FAMILIES] {
     each!(i in [0, 1, 2, 3] => x[i].mul_add(x[i], y[i] * y[i]))
