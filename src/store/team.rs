@@ -14,9 +14,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The `format` of `team.json`.
 pub(crate) const FORMAT: &str = "morphcog-team";
-/// The newest version of its schema.
 pub(crate) const FORMAT_VERSION: u32 = 1;
 
 /// The names of the figures beside it: the confusion matrix, and the poster of all bodies.
@@ -171,10 +169,7 @@ pub struct Accuracy {
 }
 
 impl Accuracy {
-    /// Checks that it covers at most this many images.
-    ///
-    /// # Errors
-    /// If more are correct, the error names the key.
+    /// Checks that it covers at most this many images; the error names the key.
     pub(crate) fn check(&self, images: usize) -> Result<(), Error> {
         match self.right <= images {
             true => Ok(()),
