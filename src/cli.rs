@@ -59,10 +59,7 @@ use clap::CommandFactory;
 pub use process::{called, main};
 use std::path::{Path, PathBuf};
 
-/// Runs a command.
-///
-/// # Errors
-/// Returns an error whose kind sets the exit code.
+/// Runs a command; the kind of an error sets the exit code.
 pub(crate) fn run(cli: Cli, console: &Console, ranks: Ranks) -> Result<(), Error> {
     let _environment = FloatEnvironment::standard();
     InstructionSet::asked().map_err(|text| Error::usage(text).advice("or leave it unset"))?;
@@ -303,7 +300,6 @@ fn run_eval(args: EvalArgs, console: &Console, ranks: Ranks) -> Result<(), Error
     )
 }
 
-/// Tests robots, and prints the results.
 fn test(options: &eval::EvalOptions, with: Resources, console: &Console) -> Result<(), Error> {
     let eval::EvalOutcome {
         file: report,
@@ -417,7 +413,6 @@ fn show(path: &Path) -> Result<(), Error> {
     })
 }
 
-/// Returns the robot to watch.
 fn the_one(
     search: &one_by_one::RobotChoice,
     data: Option<PathBuf>,

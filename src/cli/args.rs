@@ -461,7 +461,6 @@ pub(super) struct DatasetArgs {
     pub(super) transpose: Option<bool>,
 }
 
-/// Formats of moving pictures.
 const FORMATS: [&str; 4] = ["gif", "html", "png", "terminal"];
 
 fn config_or_file() -> impl TypedValueParser<Value = String> {
@@ -481,7 +480,6 @@ fn dataset() -> impl TypedValueParser<Value = String> {
 }
 
 impl Cli {
-    /// Returns the mode of the console.
     pub(crate) fn mode(&self) -> Mode {
         match (self.quiet, self.json) {
             (true, _) => Mode::Quiet,

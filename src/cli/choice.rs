@@ -30,7 +30,6 @@ pub(super) struct Archives {
 }
 
 impl Archives {
-    /// Returns the path of every run.json.
     pub(super) fn paths(&self) -> Vec<PathBuf> {
         self.archive
             .iter()

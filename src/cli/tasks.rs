@@ -58,7 +58,6 @@ pub(super) struct TaskResources {
 }
 
 impl TaskResources {
-    /// Returns the resources of a session.
     pub(super) fn with(&self) -> Resources {
         Resources::of(self.threads, self.data.clone())
     }
@@ -70,11 +69,8 @@ pub(super) struct Command<'a> {
     pub(super) words: Vec<String>,
     /// Name of the plan.
     pub(super) name: &'a str,
-    /// Its tasks.
     pub(super) tasks: &'a [Task],
-    /// Folders of the tasks.
     pub(super) place: &'a TaskFolders,
-    /// Resources of the tasks.
     pub(super) with: &'a TaskResources,
 }
 
@@ -277,9 +273,6 @@ fn from_engine() -> Result<usize, Error> {
 }
 
 /// Reports how all tasks ended.
-///
-/// # Errors
-/// Returns an error if some failed or were stopped.
 pub(super) fn ended(summary: &TasksSummary, count: usize) -> Result<(), Error> {
     let TasksSummary {
         done,

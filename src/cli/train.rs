@@ -125,11 +125,9 @@ fn name(archive: &Path, [a, b]: &[Vec<u8>; 2], seed: Option<u64>) -> String {
     format!("{of}-{}{seed}", groups_text([a, b], "v"))
 }
 
-/// Returns the training that `evolve --train` does after the gaits have evolved.
-///
-/// # Errors
-/// Returns an error if the config does not have two groups that can be trained, if several
-/// processes would share the training, or if its folder holds a run.
+/// Returns the training that `evolve --train` does after the gaits have evolved. It fails if the
+/// config does not have two groups that can be trained, several processes would share the training,
+/// or its folder holds a run.
 pub(super) fn after_evolution(
     evolution: &evolve::EvolveOptions,
     session: &Session,

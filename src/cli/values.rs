@@ -20,7 +20,6 @@ pub(super) fn offering<P: TypedValueParser>(
     }
 }
 
-/// Parser that [`offering`] returns.
 #[derive(Clone)]
 pub(super) struct Offering<P> {
     words: Vec<&'static str>,
@@ -44,7 +43,6 @@ impl<P: TypedValueParser> TypedValueParser for Offering<P> {
     }
 }
 
-/// Parses the split of held-out images.
 pub(super) fn held_out() -> impl TypedValueParser<Value = HeldOut> {
     offering(["test", "validation"], str::parse::<HeldOut>)
 }
@@ -52,7 +50,6 @@ pub(super) fn held_out() -> impl TypedValueParser<Value = HeldOut> {
 /// Largest number accepted where the program sets no limit, or a lower one elsewhere.
 pub(super) const MOST: u64 = u32::MAX as u64;
 
-/// Parses a whole number in a range.
 pub(super) fn whole<T>(range: RangeInclusive<u64>) -> impl TypedValueParser<Value = T>
 where
     T: TryFrom<u64> + Clone + Send + Sync + 'static,
@@ -78,7 +75,6 @@ pub(super) fn threads() -> impl TypedValueParser<Value = u16> {
     whole(1..=u64::from(MOST_THREADS))
 }
 
-/// Parses a number with decimals.
 pub(super) fn decimal() -> impl TypedValueParser<Value = f64> {
     |text: &str| {
         let number = text.parse().ok().filter(|number: &f64| number.is_finite());

@@ -61,7 +61,6 @@ pub struct AuditOptions {
 /// Result of an audit.
 #[derive(Clone, Debug)]
 pub struct AuditOutcome {
-    /// The content of audit.json.
     pub(crate) file: AuditFile,
     /// Ids of the requested robots.
     pub(crate) asked: Vec<String>,
@@ -75,7 +74,6 @@ pub struct AuditOutcome {
     pub unwritten: Option<Error>,
 }
 
-/// A robot to audit.
 struct Subject {
     id: String,
     task: String,
@@ -218,7 +216,6 @@ pub fn audit(options: &AuditOptions, session: &Session) -> Result<AuditOutcome, 
     })
 }
 
-/// The inputs of an audit.
 struct Opened {
     config: Config,
     fitness: Fitness,

@@ -19,11 +19,8 @@ pub struct Specimen {
 /// Simulation speed of one body, on one core.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Speed {
-    /// Name of the specimen.
     pub(crate) body: &'static str,
-    /// Number of its voxels.
     pub(crate) voxels: usize,
-    /// Instruction set.
     pub(crate) instruction_set: &'static str,
     /// Clock: "processor" is the processor time of the thread, which other load does not change;
     /// "wall" where the system has no such clock.
@@ -156,7 +153,6 @@ const REPETITIONS: usize = 101;
 /// Time limit per body: a slow machine or instruction set does fewer repetitions.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// Measures all specimens on some instruction sets, one after the other.
 pub(crate) fn table(sets: &[InstructionSet]) -> Vec<Speed> {
     let measured = |set: &InstructionSet| {
         specimens()

@@ -51,7 +51,6 @@ pub struct CapacityOptions {
 pub struct CapacityOutcome {
     /// The content of capacity.json.
     pub file: CapacityFile,
-    /// The error if results or trainings could not be written, or only in part.
     pub(crate) unwritten: Option<Error>,
 }
 
@@ -241,13 +240,10 @@ fn key(
     )
 }
 
-/// The networks to compare with robots.
 struct Networks<'a> {
     config: &'a CapacityConfig,
     images: &'a Images,
-    /// Trainings so far.
     known: Trainings,
-    /// Outcome of writing them.
     unkept: Unwritten,
     /// Number of trainings done.
     done: AtomicU64,

@@ -19,9 +19,6 @@ use std::path::PathBuf;
 
 /// Collects what the tasks found so far; `status` is of the same tasks. `warn` is told of audits and
 /// tests that cannot be read, or are of another state of their run: these are left out.
-///
-/// # Errors
-/// Returns an error if a run is broken.
 pub(crate) fn collect(
     tasks: &[Task],
     status: &[TaskStatus],

@@ -6,23 +6,18 @@ use crate::data::files::DatasetPlace;
 use crate::data::info::DatasetInfo;
 use std::collections::BTreeMap;
 
-/// Description of a dataset (`morphcog data info`).
 #[derive(Debug)]
 pub(crate) struct FoundDataset {
-    /// Name, folder and usable splits.
     pub(crate) info: DatasetInfo,
     /// Names of its files that are identical to the published ones.
     pub(crate) published: Vec<String>,
     /// Splits that belong to a dataset known by another name, with that name.
     pub(crate) others: BTreeMap<Split, &'static str>,
-    /// Unusable splits, each with the reason.
     pub(crate) problems: Vec<(Split, DatasetError)>,
 }
 
-/// Inspects each split by itself, since one may be missing. `transpose`: see [`Dataset::oriented`].
-///
-/// # Errors
-/// Returns the error of the training images if neither split can be loaded.
+/// Inspects each split by itself, since one may be missing; without any, the error is that of the
+/// training images. `transpose`: see [`Dataset::oriented`].
 pub(crate) fn info(
     name: &str,
     given: &[DatasetPlace],

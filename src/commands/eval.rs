@@ -75,7 +75,6 @@ impl EvalOptions {
 /// Result of an evaluation.
 #[derive(Clone, Debug)]
 pub struct EvalOutcome {
-    /// The content of eval.json.
     pub(crate) file: EvalFile,
     /// The error if the results could not be written, or only in part.
     pub unwritten: Option<Error>,
@@ -189,7 +188,6 @@ pub(crate) fn known(options: &EvalOptions, session: &Session) -> Result<Option<E
     Ok(is_it.then_some(known))
 }
 
-/// Returns the settings of a test: keys with their values.
 pub(crate) fn settings(file: &EvalFile) -> [(&'static str, String); 8] {
     [
         ("robots", file.selected.clone()),
@@ -297,7 +295,6 @@ struct Opened<'o> {
     /// The config under which all robots see images together.
     config: Config,
     grouping: Grouping,
-    /// Selection by validation images, if requested.
     wanted: Option<validation::Wanted>,
     whereabouts: Whereabouts,
     /// Another dataset than the runs', if requested.

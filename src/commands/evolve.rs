@@ -38,7 +38,6 @@ pub struct EvolveOptions {
 pub struct EvolveOutcome {
     /// The run as written to `run.json`.
     pub run: RunFile,
-    /// Counts of the whole run.
     pub(crate) totals: Totals,
     /// Height and width of the training images.
     pub(crate) size: [usize; 2],
@@ -169,7 +168,6 @@ pub fn evolve(options: &EvolveOptions, session: &Session) -> Result<EvolveOutcom
     })
 }
 
-/// Opens the run's metrics.csv to continue after a generation.
 fn metrics(folder: &RunFolder, generation: u64, session: &Session) -> Result<Metrics, Error> {
     let metrics = Metrics::open(folder.path(), generation)?;
     if metrics.missing > 0 {

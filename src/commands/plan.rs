@@ -65,9 +65,6 @@ impl PaperPlan {
     }
 
     /// Reads a plan from a file or, if there is none, the built-in one of that name.
-    ///
-    /// # Errors
-    /// Returns an error with file, line and key if the plan is wrong.
     pub(crate) fn load(name: &str, overrides: &[String]) -> Result<Self, Error> {
         let text = match read_given(Path::new(name)) {
             Err(_) if PaperPlan::is_built_in(name) => PAPER_TOML.1.to_string(),
@@ -113,10 +110,8 @@ impl PaperPlan {
             .map_err(|error| error.with_key("capacity"))
     }
 
-    /// Returns the experiments: names of their runs, and configs.
-    ///
-    /// # Errors
-    /// Returns an error if any is wrong: a slip in the last one would otherwise show after hours.
+    /// Returns the experiments: names of their runs, and configs. It fails if any is wrong: a slip
+    /// in the last one would otherwise show after hours.
     pub(crate) fn experiments(&self) -> Result<Vec<(String, Config)>, Error> {
         let mut experiments = Vec::<(String, Config)>::new();
         for (number, experiment) in (1..).zip(&self.experiment) {

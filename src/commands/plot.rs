@@ -42,7 +42,6 @@ pub enum FigureKind {
 }
 
 impl FigureKind {
-    /// All kinds with their names.
     pub(crate) const ALL: [(FigureKind, &str); 7] = [
         (FigureKind::Body, "body"),
         (FigureKind::Spacetime, "spacetime"),
@@ -53,7 +52,6 @@ impl FigureKind {
         (FigureKind::Capacity, "capacity"),
     ];
 
-    /// Returns true if the figure shows one robot.
     pub(crate) fn is_of_robot(self) -> bool {
         matches!(
             self,
@@ -106,9 +104,7 @@ pub struct PlotOptions {
 /// The files that were made.
 #[derive(Clone, Debug)]
 pub struct PlotOutcome {
-    /// Their paths.
     pub(crate) files: Vec<PathBuf>,
-    /// The runs in a figure of progress.
     pub(crate) progress: Vec<Progress>,
 }
 
@@ -260,9 +256,6 @@ fn possible(figure: &Figure, dpi: u32) -> Result<(), Error> {
 }
 
 /// Returns the formats that a file name implies.
-///
-/// # Errors
-/// Returns an error if the extension is not that of a figure.
 pub(crate) fn endings(out: Option<&Path>) -> Result<Vec<&'static str>, Error> {
     let Some(path) = out else {
         return Ok(vec!["svg", "png"]);

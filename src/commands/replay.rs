@@ -25,9 +25,7 @@ pub(crate) const MAX_IMAGES: usize = 20;
 /// An image by split and index: `train:3`, `test:17`; without a word, a training image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ShownImage {
-    /// Its split.
     pub(crate) split: Split,
-    /// Its index there.
     pub(crate) index: usize,
 }
 
@@ -81,7 +79,6 @@ pub struct Replay {
 /// A robot and its images, before the simulation.
 #[derive(Clone, Debug)]
 pub(crate) struct ReplaySubject {
-    /// The robot.
     pub(crate) found: FoundRobot,
     /// Images as it sees them.
     pub(crate) images: Vec<LabelledStimulus>,
@@ -128,7 +125,6 @@ pub fn replay(options: &ReplayOptions) -> Result<Replay, Error> {
     })
 }
 
-/// Records a subject's rollout.
 pub(crate) fn record_subject(subject: &ReplaySubject) -> Recording {
     let ReplaySubject {
         found:
@@ -149,10 +145,6 @@ pub(crate) fn record_subject(subject: &ReplaySubject) -> Recording {
     }
 }
 
-/// Finds a robot and its images.
-///
-/// # Errors
-/// Returns an error if the robot, archive, images or data are wrong.
 pub(crate) fn subject(options: &ReplayOptions) -> Result<ReplaySubject, Error> {
     let mut found = find(options)?;
     let config = &mut found.config;
@@ -258,17 +250,13 @@ fn some(images: &[ImageRef]) -> Vec<ImageRef> {
 pub struct FoundRobot {
     /// Its id.
     pub name: String,
-    /// Its body.
     pub(crate) body: Body,
-    /// The config it evolved with.
     pub(crate) config: Config,
     /// Its training images, as far as known.
     pub(crate) training: Vec<ImageRef>,
-    /// Dataset of these images.
     pub(crate) dataset: Option<DatasetRef>,
     /// Description on a page: words and values.
     pub(crate) about: Vec<(String, String)>,
-    /// Rule that turns its walks into answers.
     judge: Option<Readout>,
     /// The run.json it comes from.
     pub(crate) archive: PathBuf,

@@ -27,40 +27,30 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
-/// Options of a reproduction.
 #[derive(Clone, Debug)]
 pub(crate) struct ReproduceOptions {
-    /// The plan.
     pub(crate) plan: PaperPlan,
     /// Its scale, above 0 and up to 1.
     pub(crate) scale: f64,
-    /// Folders of the results.
     pub(crate) place: TaskFolders,
     /// Runs at once; `None`: one per core.
     pub(crate) jobs: Option<usize>,
 }
 
-/// Result of a reproduction.
 #[derive(Clone, Debug)]
 pub(crate) struct ReproduceOutcome {
     /// Summary of the runs; the table is made when all are done.
     pub(crate) runs: TasksSummary,
-    /// The paper's table so far.
     pub(crate) rows: Vec<TableRow>,
     /// Files written at the end.
     pub(crate) files: Vec<PathBuf>,
     /// Networks of every experiment, with their file.
     pub(crate) capacities: Vec<(PathBuf, CapacityFile)>,
-    /// True if a signal stopped it.
     pub(crate) stopped: bool,
-    /// The error if the table could not be written, or only in part.
     pub(crate) unwritten: Option<Error>,
 }
 
 /// Returns the runs of a plan at a scale: every experiment from every seed.
-///
-/// # Errors
-/// Returns an error if the scale or plan is wrong.
 pub(crate) fn tasks(plan: &PaperPlan, scale: f64) -> Result<Vec<Task>, Error> {
     if !(scale > 0.0 && scale <= 1.0) {
         return Err(Error::argument(
@@ -93,9 +83,6 @@ pub(crate) fn tasks(plan: &PaperPlan, scale: f64) -> Result<Vec<Task>, Error> {
 
 /// Completes a plan: first its missing runs, then the steps from their robots to the table. Results
 /// of an earlier, interrupted call are kept.
-///
-/// # Errors
-/// Returns an error if a check, or a step after the runs, fails.
 pub(crate) fn reproduce(
     options: &ReproduceOptions,
     session: &Session,

@@ -51,12 +51,9 @@ const IMAGES_PER_CLASS: usize = 1000;
 /// Fewest images per class of a task: half pose the design problems, half test the answers.
 const LEAST_PER_CLASS: usize = 4;
 
-/// Options of a measurement.
 #[derive(Clone, Debug)]
 pub(crate) struct ResponseOptions {
-    /// The run.json.
     pub(crate) archive: PathBuf,
-    /// Names of the robots to measure.
     pub(crate) robots: Vec<String>,
     /// True if only robots count that an audit found physical.
     pub(crate) physical_only: bool,
@@ -74,20 +71,15 @@ pub(crate) struct ResponseOptions {
     pub(crate) out: PathBuf,
 }
 
-/// Result of a measurement.
 #[derive(Clone, Debug)]
 pub(crate) struct ResponseOutcome {
-    /// The content of response.json.
     pub(crate) file: ResponseFile,
     /// Pictures of its robots, still to be drawn.
     pub(crate) pictures: Vec<[PathBuf; 2]>,
-    /// True if a signal stopped it before the last robot.
     pub(crate) stopped: bool,
-    /// The error if the results could not be written, or only in part.
     pub(crate) unwritten: Option<Error>,
 }
 
-/// A robot to measure.
 struct Subject {
     id: String,
     gait: Gait,
@@ -104,9 +96,6 @@ struct Provenance {
 
 /// Measures the responses of robots and writes the results after each one, so that stopping keeps
 /// them. Leaves out robots that cannot be measured, with a warning, if others can.
-///
-/// # Errors
-/// Returns an error if the archive, robots, data or options are wrong.
 pub(crate) fn measure(
     options: &ResponseOptions,
     session: &Session,
@@ -343,14 +332,12 @@ fn conditions(config: &Config, rollouts: usize) -> Vec<Condition> {
 /// A task that robots could be trained for.
 struct Task {
     groups: Groups,
-    /// Config of its training.
     config: Config,
     dataset: Dataset,
     /// Training images, equally many per class, class by class.
     images: Vec<ImageRef>,
 }
 
-/// Reads the requested task.
 fn task(
     options: &ResponseOptions,
     provenance: &Provenance,
@@ -538,7 +525,6 @@ struct Measuring<'a> {
     config: &'a Config,
     probing: Probing,
     task: Option<Task>,
-    /// Earlier results, with their paths.
     earlier: Vec<(PathBuf, ResponseFile)>,
     run_sha256: &'a str,
     seed: u64,

@@ -59,10 +59,6 @@ const fn of<T: JsonSchema>(name: &'static str, of: &'static str, version: u32) -
 }
 
 impl Schema {
-    /// Returns the schema with this name.
-    ///
-    /// # Errors
-    /// Returns an error if there is none.
     pub(crate) fn named(name: &str) -> Result<Self, Error> {
         ALL.into_iter()
             .find(|schema| schema.name == name)

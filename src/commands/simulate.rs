@@ -115,9 +115,6 @@ impl Scenario {
     }
 
     /// Parses a scenario; errors mention `name`.
-    ///
-    /// # Errors
-    /// As [`Scenario::read`].
     pub(crate) fn parse(text: &str, name: &str) -> Result<Self, Error> {
         let scenario: Scenario = reading::read_json(text, name)?;
         scenario.validate().map_err(|error| error.in_place(name))?;
@@ -209,7 +206,6 @@ impl Scenario {
         self.stimuli.as_deref().unwrap_or(self.stimulus.as_slice())
     }
 
-    /// Returns the position where it begins.
     pub(crate) fn start(&self) -> Start {
         Start {
             column: self.start_column,
@@ -217,12 +213,10 @@ impl Scenario {
         }
     }
 
-    /// Returns the constants of the simulator.
     pub(crate) fn physics(&self) -> &Physics {
         &self.physics
     }
 
-    /// Returns the number of control steps.
     pub(crate) fn control_steps(&self) -> u64 {
         let shown = self
             .switch_every
@@ -294,11 +288,8 @@ pub fn simulate(
     Ok(())
 }
 
-/// Writes the CSV of a scenario to a file; that of an unstable simulation goes up to its end.
-///
-/// # Errors
-/// As [`Scenario::read`] and [`simulate`]; if the file cannot be written or is the scenario's; if
-/// the session was stopped, which leaves the file unchanged.
+/// Writes the CSV of a scenario to a file, which must not be the scenario's; that of an unstable
+/// simulation goes up to its end. A stopped session leaves the file unchanged.
 pub(crate) fn to_file(
     from: &Path,
     points: bool,

@@ -61,7 +61,6 @@ pub(crate) struct SweepPlan {
     pub(crate) eval: Option<EvalStep>,
 }
 
-/// A value of a varied key.
 #[derive(Clone, Debug)]
 struct Setting {
     key: String,
@@ -79,9 +78,6 @@ enum Base {
 
 impl SweepPlan {
     /// Reads a plan (TOML, or JSON if its name ends in `.json`), with `overrides` applied.
-    ///
-    /// # Errors
-    /// Returns an error with file, line and key if the plan is wrong.
     pub(crate) fn load(path: &Path, overrides: &[String]) -> Result<Self, Error> {
         let text = read_given(path).map_err(|error| {
             let schema = Remedy::Run(
@@ -246,9 +242,6 @@ impl SweepPlan {
 
     /// Returns the tasks, numbered from 1 in this order: varied keys by their names, the last one
     /// changing fastest; then groups; then seeds.
-    ///
-    /// # Errors
-    /// Returns everything that is wrong with the plan, or with its tasks, at once.
     pub(crate) fn tasks(&self, path: &Path) -> Result<Vec<Task>, Vec<Error>> {
         let one = |error: Error| vec![error.in_place(&path.display().to_string())];
         let sets = |wanted: &dyn Fn(&str) -> bool| {

@@ -15,7 +15,6 @@ use std::path::{Path, PathBuf};
 pub(crate) struct TableRow {
     /// The task, as "0|1".
     pub(crate) task: String,
-    /// Number of robots tested.
     pub(crate) robots: usize,
     /// Number of physical ones among them.
     pub(crate) physical: usize,
@@ -39,7 +38,6 @@ pub(crate) struct TableRow {
     pub(crate) paper_accuracy: Option<f64>,
     /// The paper's capacity in neurons; `None` without a match.
     pub(crate) paper_mlp: Option<f64>,
-    /// The paper's capacity in kernels; `None` without a match.
     pub(crate) paper_cnn: Option<f64>,
 }
 
@@ -65,7 +63,6 @@ impl TableRow {
         }
     }
 
-    /// Adds the results of a test and of networks.
     pub(crate) fn fill(&mut self, report: &EvalFile, capacity: &CapacityFile) {
         if let Some(mean) = report.means.get(&self.task) {
             self.robots = mean.robots;

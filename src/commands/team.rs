@@ -38,18 +38,14 @@ use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-/// Options of a team's test.
 #[derive(Clone, Debug)]
 pub(crate) struct TeamOptions {
-    /// The run.json files.
     pub(crate) archives: Vec<PathBuf>,
     /// Their robots. Ids are looked up in all runs together; other selections apply to each run.
     pub(crate) robots: Selection,
     /// Classes to tell apart; `None`: all of the dataset.
     pub(crate) classes: Option<Vec<u8>>,
-    /// Number of images.
     pub(crate) images: HowMany,
-    /// Split of the images.
     pub(crate) split: HeldOut,
     /// Seed for drawing images, and robots with `random:N`.
     pub(crate) seed: u64,
@@ -57,19 +53,13 @@ pub(crate) struct TeamOptions {
     pub(crate) out: PathBuf,
 }
 
-/// Result of a team's test.
 #[derive(Clone, Debug)]
 pub(crate) struct TeamOutcome {
-    /// The content of team.json.
     pub(crate) file: TeamFile,
-    /// The error if the results could not be written, or only in part.
     pub(crate) unwritten: Option<Error>,
 }
 
 /// Tests a team on images. Writes the file after every robot; the same command goes on from there.
-///
-/// # Errors
-/// Returns an error if robots do not fit the classes, or archive, data or selection is wrong.
 pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutcome, Error> {
     let archives = options.archives.iter();
     let sources = archives
@@ -204,7 +194,6 @@ pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutco
     })
 }
 
-/// Checks that two runs have robots of the same data.
 fn same_data(first: &StoredRun, other: &StoredRun) -> Result<(), Error> {
     let (a, b) = (&first.run, &other.run);
     if a.dataset == b.dataset && a.config.data.builtin == b.config.data.builtin {
@@ -242,7 +231,6 @@ fn chosen<'a>(options: &TeamOptions, sources: &'a [StoredRun]) -> Result<Vec<Cho
     Ok(all)
 }
 
-/// Returns the classes to tell apart, in order.
 fn classes(options: &TeamOptions, dataset: &Dataset) -> Result<Vec<u8>, Error> {
     let all = dataset.classes(Split::Train);
     let mut classes = options.classes.clone().unwrap_or_else(|| all.clone());
@@ -275,7 +263,6 @@ pub(crate) fn own_name(split: HeldOut) -> &'static str {
     }
 }
 
-/// Returns the two groups that a robot tells apart.
 fn split_of(source: &StoredRun, chosen: &Chosen) -> Result<grouping::ClassSplit, Error> {
     let grouping = source.run.config.grouping()?;
     let text = || {

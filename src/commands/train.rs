@@ -181,7 +181,6 @@ fn apart(out: &Path, archive: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-/// Builds the run file of the trained robot.
 fn run_file(
     options: &TrainOptions,
     config: &Config,

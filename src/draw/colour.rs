@@ -3,7 +3,6 @@
 
 use crate::body::Material;
 
-/// A colour with opacity, 8 bits each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Colour {
     /// Red, green, blue (sRGB).
@@ -13,7 +12,6 @@ pub(crate) struct Colour {
 }
 
 impl Colour {
-    /// Creates an opaque colour.
     pub(crate) const fn new(red: u8, green: u8, blue: u8) -> Self {
         Colour {
             rgb: [red, green, blue],
@@ -21,7 +19,6 @@ impl Colour {
         }
     }
 
-    /// Returns this colour with another opacity.
     pub(crate) const fn with_opacity(self, opacity: u8) -> Self {
         Colour {
             rgb: self.rgb,
@@ -48,9 +45,7 @@ pub(crate) const PAPER: Colour = Colour::new(255, 255, 255);
 pub(crate) const INK: Colour = Colour::new(34, 36, 40);
 /// The colour of secondary text.
 pub(crate) const FAINT: Colour = Colour::new(112, 116, 124);
-/// The ground.
 pub(crate) const GROUND: Colour = Colour::new(236, 233, 226);
-/// The lines on the ground.
 pub(crate) const GROUND_LINE: Colour = Colour::new(120, 112, 98);
 /// The lines between the columns and rows of the world, in the paper's look.
 pub(crate) const GRID: Colour = Colour::new(228, 231, 236);
@@ -60,7 +55,6 @@ pub(crate) const PEG: Colour = Colour::new(72, 74, 80);
 pub(crate) const TRACE: Colour = Colour::new(178, 24, 158);
 /// The lines between voxels where they are opaque.
 pub(crate) const SEAM: Colour = Colour::new(226, 228, 232);
-/// The colour of warnings.
 pub(crate) const ALARM: Colour = Colour::new(190, 20, 40);
 
 /// Areas (square voxel lengths) at which a voxel has the first, middle and last of its [`tones`].

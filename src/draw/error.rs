@@ -64,11 +64,7 @@ impl From<PictureError> for Error {
     }
 }
 
-/// Writes a file atomically, through a temporary file in the same folder that is then renamed.
-/// Readers find either the whole file or the old one.
-///
-/// # Errors
-/// [`PictureError::Write`] with the path.
+/// Writes a file through a temporary one beside it: readers find the whole file or the old one.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), PictureError> {
     crate::base::files::write_atomically(path, bytes).map_err(|source| PictureError::Write {
         path: path.to_path_buf(),

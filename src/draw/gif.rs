@@ -14,7 +14,6 @@ use ::gif::{DisposalMethod, Encoder, Frame, Repeat};
 use rayon::prelude::*;
 use std::path::Path;
 
-/// Options of an animation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct GifOptions {
     /// Width in pixels ([`stage::WIDTHS`](crate::draw::stage::WIDTHS)); the body gives the height.
@@ -24,7 +23,6 @@ pub(crate) struct GifOptions {
     /// The control steps from one frame to the next, at least 1. A second of the robot's time has
     /// 50 control steps, so 1 at 50 frames per second is real time.
     pub(crate) every: usize,
-    /// The look of the world.
     pub(crate) look: Look,
     /// The seconds for which the last frame of each phase stays.
     pub(crate) hold: f64,
@@ -50,10 +48,6 @@ const SHADES: u32 = 9;
 const BATCH: usize = 32;
 
 /// Writes a recording as an animated GIF that loops for ever.
-///
-/// # Errors
-/// Returns a [`PictureError`] if the recording cannot be drawn, the width is not possible or the
-/// file cannot be written.
 pub(crate) fn write(
     path: &Path,
     recording: &Recording,
@@ -74,10 +68,6 @@ pub(crate) fn shown(walk: &Walk, every: usize) -> Vec<usize> {
     frames
 }
 
-/// Returns the bytes of the animated GIF.
-///
-/// # Errors
-/// Returns the errors of [`write()`], except those of the file.
 pub(crate) fn encode(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, PictureError> {
     in_pool(|| encoded(recording, options))?
 }

@@ -33,9 +33,6 @@ const NOWHERE: i16 = i16::MIN;
 const MOST_BYTES: usize = 5_500_000;
 
 /// Writes the page. The `title` and `metadata` (a table, in order) may contain any text.
-///
-/// # Errors
-/// Returns a [`PictureError`] if the recording cannot be drawn or the file cannot be written.
 pub(crate) fn write(
     path: &Path,
     recording: &Recording,
@@ -137,17 +134,11 @@ pub(super) fn player(rollout: &str) -> String {
 }
 
 /// Packs a recording for [`player`]: gzip in base64, of about `most` bytes at the largest.
-///
-/// # Errors
-/// Returns [`PictureError::Encode`] if packing fails.
 pub(super) fn packed(walk: &Walk, most: usize) -> Result<String, PictureError> {
     pack(&rollout(walk, most))
 }
 
 /// Packs a value as text: gzip in base64. The bytes are reproducible: the header holds no time.
-///
-/// # Errors
-/// Returns [`PictureError::Encode`] if packing fails.
 pub(super) fn pack(value: &Value) -> Result<String, PictureError> {
     packed_bytes(value.to_string().as_bytes())
 }
@@ -178,7 +169,6 @@ fn differences(positions: &[i16], width: usize) -> Vec<u8> {
         .collect()
 }
 
-/// Returns the number of points that every frame has.
 fn points(recording: &Recording) -> usize {
     recording
         .frames

@@ -50,7 +50,6 @@ impl Palette {
         }
     }
 
-    /// Returns the index of the colour nearest to a pixel's red, green and blue.
     pub(crate) fn index(&self, [r, g, b]: [u8; 3]) -> u8 {
         let bin = usize::from(r >> 2) << 12 | usize::from(g >> 2) << 6 | usize::from(b >> 2);
         self.nearest[bin]

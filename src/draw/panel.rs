@@ -86,7 +86,6 @@ pub(crate) fn least_width(walk: &Walk) -> f64 {
 /// The words about a moment of a walk that every view shows.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Caption {
-    /// The label of the current image.
     pub(crate) label: String,
     /// The control steps completed in the phase, their total, and the cycles completed.
     pub(crate) time: String,
@@ -96,7 +95,6 @@ pub(crate) struct Caption {
     pub(crate) verdict: String,
 }
 
-/// Returns the words about a frame.
 pub(crate) fn readout(walk: &Walk, frame: usize) -> Caption {
     let frames = walk.phase_frames(walk.phase_index(frame));
     // A phase that continues into the next ends with the first frame of that phase.

@@ -14,9 +14,6 @@ use tiny_skia::{FillRule, LineCap, LineJoin, Paint, PathBuilder, Pixmap, Stroke,
 const BEYOND: f64 = 8192.0;
 
 /// Renders the picture of a frame as opaque RGBA.
-///
-/// # Errors
-/// Returns [`PictureError::Size`] if the stage has no pixels.
 pub(crate) fn picture(walk: &Walk, frame: usize, stage: &Stage) -> Result<Pixmap, PictureError> {
     let (width, height) = (stage.width, stage.height);
     let mut pixmap = Pixmap::new(width, height).ok_or(PictureError::Size { width, height })?;
@@ -114,7 +111,6 @@ fn polyline(points: impl Iterator<Item = [f32; 2]>, closed: bool) -> Option<tiny
     builder.finish()
 }
 
-/// Returns the paint for a colour.
 pub(crate) fn paint(colour: Colour, smooth: bool) -> Paint<'static> {
     let mut paint = Paint {
         anti_alias: smooth,
@@ -126,9 +122,6 @@ pub(crate) fn paint(colour: Colour, smooth: bool) -> Paint<'static> {
 }
 
 /// Writes a picture as PNG, atomically.
-///
-/// # Errors
-/// Returns [`PictureError::Encode`] or [`PictureError::Write`].
 pub(crate) fn write_png(path: &Path, picture: &Pixmap) -> Result<(), PictureError> {
     let bytes = picture
         .encode_png()

@@ -7,7 +7,6 @@ use crate::draw::walk::{Walk, area};
 use std::fmt;
 use std::str::FromStr;
 
-/// The look of the world.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Look {
     /// With a ruler on the ground.
@@ -40,37 +39,26 @@ impl FromStr for Look {
 /// depending on the function that creates it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Primitive {
-    /// A filled quadrilateral.
     Quad {
-        /// The corners in order.
         corners: [[f64; 2]; 4],
-        /// The fill colour.
         fill: Colour,
         /// True if the edges are smoothed; axis-parallel rectangles on whole pixels do not need it.
         smooth: bool,
     },
-    /// A line through points.
     Line {
-        /// The points in order.
         points: Vec<[f64; 2]>,
         /// The width as a multiple of the picture's zoom (about a pixel in a small picture).
         width: f64,
-        /// The colour of the line.
         colour: Colour,
-        /// True if the edges are smoothed.
         smooth: bool,
     },
-    /// A line of text.
     Text {
-        /// The content.
         text: String,
         /// The start of the baseline.
         at: [f64; 2],
         /// The font size, pixels.
         size: f64,
-        /// True if the text is bold.
         bold: bool,
-        /// The colour of the text.
         colour: Colour,
     },
 }
@@ -90,7 +78,6 @@ impl Primitive {
         }
     }
 
-    /// Creates a line between two points.
     pub(crate) fn line(from: [f64; 2], to: [f64; 2], width: f64, colour: Colour) -> Self {
         Primitive::Line {
             points: vec![from, to],
@@ -104,19 +91,15 @@ impl Primitive {
 /// A visible part of the world, voxel lengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Window {
-    /// The left edge.
     pub(crate) left: f64,
-    /// The right edge.
     pub(crate) right: f64,
     /// The lower edge, below the ground's surface at 0.
     pub(crate) bottom: f64,
-    /// The upper edge.
     pub(crate) top: f64,
     /// The pixels per voxel length; details too small to see are left out.
     pub(crate) scale: f64,
     /// True if voxels have hard edges, whose fewer colours keep animations small.
     pub(crate) crisp: bool,
-    /// The look of the world.
     pub(crate) look: Look,
 }
 

@@ -19,10 +19,8 @@ const PAPER: u8 = 96;
 /// The longest side of a picture, pixels.
 const MAX_SIDE: usize = 16_384;
 
-/// A reason why a contact sheet cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum SheetError {
-    /// An image is not available.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
     /// The sheet would be empty or too large.
@@ -35,18 +33,13 @@ pub(crate) enum SheetError {
         classes: usize,
         /// The number of columns.
         samples: usize,
-        /// The height in pixels.
         height: usize,
-        /// The width in pixels.
         width: usize,
     },
-    /// The picture cannot be encoded as a PNG.
     #[error("the contact sheet cannot be made into a PNG: {0}")]
     Png(String),
-    /// The picture cannot be written.
     #[error("{}: cannot be written: {source}", file.display())]
     Write {
-        /// The path of the file.
         file: PathBuf,
         /// The error from the operating system.
         source: io::Error,
@@ -56,10 +49,6 @@ pub(crate) enum SheetError {
 /// Draws the first `samples` images of every class of a split, one class per row; grey, 0 is black.
 /// Small images are enlarged three times, larger ones twice or not at all. Even larger ones shrink
 /// until their longest side has 256 pixels.
-///
-/// # Errors
-/// Returns [`SheetError::Size`] if the sheet would be empty or too large, or
-/// [`SheetError::Dataset`] if an image is not available.
 pub(crate) fn contact_sheet(
     dataset: &Dataset,
     split: Split,
@@ -105,9 +94,6 @@ fn shown([height, width]: [usize; 2]) -> [usize; 2] {
 }
 
 /// Writes a grey picture as PNG, atomically.
-///
-/// # Errors
-/// Returns [`SheetError::Write`] if the file cannot be written.
 pub(crate) fn write_png(file: &Path, picture: &Grid<u8>) -> Result<(), SheetError> {
     let bytes = png(picture)?;
     write_atomically(file, &bytes).map_err(|source| SheetError::Write {

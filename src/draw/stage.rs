@@ -45,9 +45,6 @@ pub(crate) struct Stage {
 impl Stage {
     /// Creates the stage for a recording in a picture `width` pixels wide; the height follows from
     /// the body.
-    ///
-    /// # Errors
-    /// Returns [`PictureError::Size`] if the width is not in [`WIDTHS`].
     pub(crate) fn new(walk: &Walk, width: u32) -> Result<Self, PictureError> {
         if !WIDTHS.contains(&width) {
             return Err(PictureError::Size { width, height: 0 });
@@ -108,7 +105,6 @@ impl Stage {
         }
     }
 
-    /// Sets the look of the world.
     pub(crate) fn look(self, look: Look) -> Self {
         Stage { look, ..self }
     }

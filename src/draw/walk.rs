@@ -23,11 +23,8 @@ pub struct Walk<'a> {
 /// The smallest and largest x, and the largest y, of some points, voxel lengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Extent {
-    /// The smallest x.
     pub(crate) left: f64,
-    /// The largest x.
     pub(crate) right: f64,
-    /// The largest y.
     pub(crate) top: f64,
 }
 
@@ -75,7 +72,6 @@ impl<'a> Walk<'a> {
         })
     }
 
-    /// Returns the recording.
     pub(crate) fn recording(&self) -> &'a Recording {
         self.recording
     }
@@ -85,7 +81,6 @@ impl<'a> Walk<'a> {
         self.recording.frames.len()
     }
 
-    /// Returns the index of the phase that contains a frame.
     pub(crate) fn phase_index(&self, frame: usize) -> usize {
         self.recording
             .phases
@@ -94,12 +89,10 @@ impl<'a> Walk<'a> {
             .unwrap_or(0)
     }
 
-    /// Returns the phase that contains a frame.
     pub(crate) fn phase(&self, frame: usize) -> &'a Phase {
         &self.recording.phases[self.phase_index(frame)]
     }
 
-    /// Returns the frames of a phase.
     pub(crate) fn phase_frames(&self, phase: usize) -> Range<usize> {
         let first = |p: usize| {
             self.recording

@@ -5,7 +5,6 @@ use crate::serve::http::HttpResponse;
 const JS: &str = "text/javascript; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";
 
-/// Returns the file at a path.
 pub(crate) fn asset(path: &str) -> Option<HttpResponse> {
     let (content_type, text) = match path {
         "/" => ("text/html; charset=utf-8", include_str!("page/page.html")),

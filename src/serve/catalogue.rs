@@ -25,7 +25,6 @@ use std::time::{Duration, Instant, SystemTime};
 /// Robots from one source. They share a world; robots that ship together may have different
 /// windows.
 pub(crate) struct Collection {
-    /// The name on the page.
     pub(crate) name: String,
     /// The path of the run.json; `None` if it is built in.
     pub(crate) path: Option<PathBuf>,
@@ -33,11 +32,9 @@ pub(crate) struct Collection {
     pub(crate) config: Config,
     /// The dataset of the run; `None` for published robots.
     pub(crate) dataset: Option<DatasetRef>,
-    /// The number of generations completed.
     pub(crate) generations: Option<u64>,
     /// The bins of the archive's dimensions muscle, sensor and total.
     pub(crate) bins: Vec<usize>,
-    /// The names of the tasks.
     pub(crate) tasks: Vec<String>,
     /// The robots, fittest first.
     pub(crate) robots: Vec<Entry>,
@@ -48,49 +45,38 @@ pub(crate) struct Collection {
 /// A robot that the page can simulate.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Entry {
-    /// The id or name.
     pub(crate) id: String,
     /// The task, such as "0|123".
     pub(crate) task: String,
     /// The fitness on the training images, as measured by its run.
     pub(crate) fitness: f64,
-    /// The voxel counts by kind.
     pub(crate) voxels: VoxelCounts,
     /// The cell in the archive; empty for a published robot.
     pub(crate) cell: Vec<usize>,
-    /// The generation in which it was born.
     pub(crate) generation: Option<u64>,
-    /// The parameters of its stimulus.
     pub(crate) encoding: StimulusParams,
     /// The judge of its walks; `None` if all classes walk the same way.
     pub(crate) judge: Option<Readout>,
     /// The result of an audit, if one is beside the archive.
     pub(crate) audit: Option<Audited>,
-    /// The body.
     pub(crate) body: Body,
 }
 
 /// A body with everything that its simulation depends on.
 #[derive(Clone, Debug)]
 pub(crate) struct Who {
-    /// The body.
     pub(crate) body: Body,
-    /// The constants of its world.
     pub(crate) physics: Physics,
     /// Its start, and the duration of an image.
     pub(crate) protocol: Protocol,
-    /// The parameters of its stimulus.
     pub(crate) encoding: StimulusParams,
     /// The judge of its walks; `None` for a body without a task.
     pub(crate) judge: Option<Readout>,
 }
 
-/// The result of an audit.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Audited {
-    /// The verdict in a word or two.
     pub(crate) verdict: &'static str,
-    /// The verdict with its reason.
     pub(crate) conclusion: String,
 }
 
@@ -99,23 +85,17 @@ pub(crate) struct Audited {
 pub(crate) struct CollectionSummary {
     /// The number of the collection, from 0.
     pub(crate) index: usize,
-    /// The name on the page.
     pub(crate) name: String,
     /// The path of the run.json; `None` if it is built in.
     pub(crate) path: Option<String>,
-    /// The number of robots.
     pub(crate) robots: usize,
-    /// The names of the tasks.
     pub(crate) tasks: Vec<String>,
-    /// The dataset on which the robots evolved.
     pub(crate) dataset: String,
-    /// The number of generations completed.
     pub(crate) generations: Option<u64>,
     /// The number of generations requested.
     pub(crate) asked: Option<u64>,
     /// The number of changes since the archive was first read.
     pub(crate) changes: u64,
-    /// The largest fitness.
     pub(crate) best: Option<f64>,
 }
 
@@ -137,7 +117,6 @@ struct Known {
 /// Identifies a version of a file: its modification time and length.
 type Stamp = (SystemTime, u64);
 
-/// The stamps of a run and of its audit.
 type Stamps = [Option<Stamp>; 2];
 
 /// Returns the stamp of a file, or `None` if there is no such file.
@@ -166,7 +145,6 @@ pub(crate) struct RobotCatalogue {
     watch: Mutex<Watch>,
 }
 
-/// The files to poll.
 struct Watch {
     watched: Vec<Watched>,
     /// Their paths, as given and with links resolved.
@@ -183,9 +161,6 @@ impl RobotCatalogue {
     /// Reads the archives, and the audits beside them. An unusable audit becomes a note, and so
     /// does a `newest` run, which nobody named, if it cannot be read. Changed runs in the folder
     /// `runs` are added later.
-    ///
-    /// # Errors
-    /// Returns an error if an archive is invalid.
     pub(crate) fn open(
         archives: &[PathBuf],
         newest: Option<&Path>,
@@ -238,7 +213,6 @@ impl RobotCatalogue {
         Arc::clone(&known())
     }
 
-    /// Summarises all collections.
     pub(crate) fn list(&self) -> Vec<CollectionSummary> {
         let short = |(from, asked, changes): (&Collection, Option<u64>, u64)| CollectionSummary {
             index: 0,
@@ -265,7 +239,6 @@ impl RobotCatalogue {
             .collect()
     }
 
-    /// Returns all collections.
     pub(crate) fn collections(&self) -> Vec<Arc<Collection>> {
         let archives = self.archives();
         self.built_in
@@ -275,10 +248,6 @@ impl RobotCatalogue {
             .collect()
     }
 
-    /// Returns a collection by its number.
-    ///
-    /// # Errors
-    /// Returns an error if there is no such collection.
     pub(crate) fn collection(&self, index: usize) -> Result<Arc<Collection>, HttpRefusal> {
         let collections = self.collections();
         let unknown = || {
@@ -290,10 +259,6 @@ impl RobotCatalogue {
         collections.get(index).cloned().ok_or_else(unknown)
     }
 
-    /// Returns the course of a collection's run so far.
-    ///
-    /// # Errors
-    /// Returns an error if there is no such run, or its `metrics.csv` cannot be read.
     pub(crate) fn course(&self, index: usize) -> Result<Course, HttpRefusal> {
         let collection = self.collection(index)?;
         let Some(path) = &collection.path else {
@@ -412,10 +377,6 @@ fn read(path: &Path) -> Option<Result<Collection, Error>> {
 }
 
 impl Collection {
-    /// Returns a robot by its id.
-    ///
-    /// # Errors
-    /// Returns an error if there is no such robot.
     pub(crate) fn robot(&self, id: &str) -> Result<&Entry, HttpRefusal> {
         let found = self
             .robots
@@ -427,9 +388,6 @@ impl Collection {
     }
 
     /// Returns a robot by its id, with everything that its simulation depends on.
-    ///
-    /// # Errors
-    /// Returns an error if there is no such robot.
     pub(crate) fn who(&self, id: &str) -> Result<Who, HttpRefusal> {
         let (robot, config) = (self.robot(id)?, &self.config);
         Ok(Who {

@@ -11,9 +11,7 @@ use std::path::Path;
 /// The metrics of a run so far: `metrics.csv`, thinned.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Course {
-    /// The number of generations completed.
     pub(crate) done: usize,
-    /// The number of generations requested.
     pub(crate) asked: u64,
     /// True if a process is working on the run.
     pub(crate) under_way: bool,
@@ -21,7 +19,6 @@ pub(crate) struct Course {
     pub(crate) seconds_left: Option<f64>,
     /// The generations of the curves' points.
     pub(crate) generation: Vec<usize>,
-    /// The QD score.
     pub(crate) qd_score: Vec<f64>,
     /// The share of cells that are filled.
     pub(crate) coverage: Vec<f64>,
@@ -34,9 +31,6 @@ const POINTS: usize = 240;
 
 impl Course {
     /// Reads the course of a run.json's run; `asked` is the requested number of generations.
-    ///
-    /// # Errors
-    /// Returns an error if its `metrics.csv` exists and cannot be read.
     pub(crate) fn of(archive: &Path, asked: u64) -> Result<Self, Error> {
         // Runs of the gallery and the atlas lack this file, as do runs that just began.
         let moments = if exists(&archive.with_file_name(METRICS)) {

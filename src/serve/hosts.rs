@@ -62,9 +62,6 @@ impl Hosts {
 
     /// Checks that a request is for this page and comes from it. It refuses names that other sites
     /// point at this machine (DNS rebinding), and requests from other sites' pages.
-    ///
-    /// # Errors
-    /// Returns the refusal to send.
     pub(crate) fn check(&self, request: &Request) -> Result<(), HttpResponse> {
         let Some(host) = request.header("host")? else {
             return Err(HttpResponse::refusal(400, "expected a Host header"));

@@ -9,7 +9,6 @@ use std::time::{Duration, Instant};
 
 /// The longest request line with headers \[bytes\].
 const MAX_HEAD: usize = 16 * 1024;
-/// Maximum number of headers.
 const MAX_HEADERS: usize = 64;
 /// The longest body of a request \[bytes\]; a body and a stimulus of 64 × 64 fit.
 pub(crate) const MAX_BODY: usize = 256 * 1024;
@@ -18,10 +17,8 @@ const TO_READ: Duration = Duration::from_secs(10);
 /// Time limit for the reader to take what is written.
 const TO_WRITE: Duration = Duration::from_secs(20);
 
-/// An HTTP request.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct Request {
-    /// The method, such as "GET".
     pub(crate) method: String,
     /// The path without the query.
     pub(crate) path: String,
@@ -29,16 +26,12 @@ pub(crate) struct Request {
     pub(crate) query: String,
     /// Names in lower case.
     headers: Vec<(String, String)>,
-    /// The body.
     pub(crate) body: Vec<u8>,
 }
 
 impl Request {
-    /// Returns a header's value, or `None` if it is missing.
-    ///
-    /// # Errors
-    /// Returns a refusal if it occurs more than once: one might pass the check and another take
-    /// effect.
+    /// Returns a header's value, or `None` if it is missing. It refuses one that occurs more than
+    /// once: one might pass the check and another take effect.
     pub(crate) fn header(&self, name: &str) -> Result<Option<&str>, HttpResponse> {
         let mut found = self.headers.iter().filter(|(own, _)| own == name);
         let first = found.next().map(|(_, value)| value.as_str());
@@ -75,7 +68,6 @@ pub(crate) struct HttpResponse {
 }
 
 impl HttpResponse {
-    /// Creates the response for an embedded file.
     pub(crate) fn file(content_type: &'static str, text: &str) -> Self {
         HttpResponse {
             status: 200,
@@ -85,7 +77,6 @@ impl HttpResponse {
         }
     }
 
-    /// Creates a JSON response.
     pub(crate) fn json(value: &impl Serialize) -> Self {
         match serde_json::to_vec(value) {
             Ok(body) => HttpResponse {
@@ -119,7 +110,6 @@ impl HttpResponse {
         }
     }
 
-    /// Creates the response to a request with a wrong method.
     pub(crate) fn wrong_method(allow: &'static str) -> Self {
         HttpResponse {
             allow: Some(allow),
@@ -128,9 +118,6 @@ impl HttpResponse {
     }
 
     /// Sends the response; only the head if `head_only`, in answer to HEAD.
-    ///
-    /// # Errors
-    /// Returns an error if the reader has gone.
     pub(crate) fn send(&self, stream: &mut TcpStream, head_only: bool) -> io::Result<()> {
         let allow = self
             .allow
@@ -174,9 +161,6 @@ fn head(status: u16, content_type: &str, more: &str) -> String {
 }
 
 /// Begins a stream of server-sent events, which lasts until the connection is closed.
-///
-/// # Errors
-/// Returns an error if the reader has gone.
 pub(crate) fn begin_events(stream: &mut TcpStream) -> io::Result<()> {
     stream.set_nodelay(true)?;
     // Keeps proxies from buffering events.
@@ -184,9 +168,6 @@ pub(crate) fn begin_events(stream: &mut TcpStream) -> io::Result<()> {
 }
 
 /// Reads a request, or `None` if the connection sent nothing.
-///
-/// # Errors
-/// Returns the refusal to send if the data are no valid request.
 pub(crate) fn read(stream: &mut TcpStream) -> Result<Option<Request>, HttpResponse> {
     let broken = |error: &io::Error| {
         HttpResponse::refusal(400, &format!("the request cannot be read: {error}"))

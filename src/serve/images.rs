@@ -13,31 +13,24 @@ use std::path::Path;
 /// Maximum number of images in one response.
 pub(crate) const MAX_PAGE: usize = 60;
 
-/// The identifier of an image.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ImageName {
-    /// The name of its set.
     pub(crate) set: String,
     /// The index among the test images.
     pub(crate) index: usize,
 }
 
-/// A test image with its class and pixels.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct TestImage {
-    /// The index among the test images.
     pub(crate) index: usize,
-    /// The class.
     pub(crate) label: u8,
     /// The pixels, 0 paper … 255 ink, rows from the top.
     pub(crate) pixels: Grid<u8>,
 }
 
-/// The contents of a set.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct SetSummary {
-    /// The name of the set.
     pub(crate) name: String,
     /// The number of test images by class.
     pub(crate) classes: Vec<(u8, usize)>,
@@ -50,9 +43,6 @@ pub(crate) struct ImageSets {
 
 impl ImageSets {
     /// Loads the available datasets; a missing one becomes a note.
-    ///
-    /// # Errors
-    /// Returns an error if the built-in digits cannot be made (which does not happen).
     pub(crate) fn open(
         catalogue: &RobotCatalogue,
         data: Option<&Path>,
@@ -100,7 +90,6 @@ impl ImageSets {
         ))
     }
 
-    /// Summarises all sets.
     pub(crate) fn list(&self) -> Vec<SetSummary> {
         let classes = |set: &Dataset| {
             let classes = set.classes(Split::Test).into_iter();
@@ -123,9 +112,6 @@ impl ImageSets {
     }
 
     /// Returns `count` images of a class, starting at number `from`.
-    ///
-    /// # Errors
-    /// Returns an error if there is no such set.
     pub(crate) fn page(
         &self,
         set: &str,
@@ -152,10 +138,6 @@ impl ImageSets {
             .collect()
     }
 
-    /// Returns an image.
-    ///
-    /// # Errors
-    /// Returns an error if there is no such image.
     pub(crate) fn image(&self, name: &ImageName) -> Result<TestImage, HttpRefusal> {
         let unknown =
             |error: crate::data::dataset::DatasetError| HttpRefusal::Unknown(error.to_string());

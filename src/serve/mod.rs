@@ -48,11 +48,8 @@ pub struct ServeOptions {
 
 /// Everything that a page can request.
 pub struct Service {
-    /// The robots to choose from.
     pub(crate) catalogue: RobotCatalogue,
-    /// The test images to choose from.
     pub(crate) images: ImageSets,
-    /// The simulations that are running.
     pub(crate) simulations: Simulations,
     /// The threads in which the robots of teams walk.
     pub(crate) pool: rayon::ThreadPool,
@@ -63,11 +60,8 @@ pub struct Service {
 /// The response to `/api/status`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub(crate) struct ServiceStatus {
-    /// The version of the program.
     pub(crate) version: &'static str,
-    /// The number of simulations running now.
     pub(crate) simulations: usize,
-    /// The maximum number of simulations at once.
     pub(crate) max_simulations: usize,
     /// The number of simulations begun so far.
     pub(crate) begun: u64,
@@ -78,11 +72,8 @@ pub(crate) struct ServiceStatus {
 pub(crate) struct Checked {
     /// True if there is a voxel and all voxels are connected.
     pub(crate) connected: bool,
-    /// The number of muscle voxels.
     pub(crate) muscle: usize,
-    /// The number of sensor voxels.
     pub(crate) sensor: usize,
-    /// The number of all voxels.
     pub(crate) total: usize,
     /// The reason why it is not viable; `None` if it is.
     pub(crate) problem: Option<&'static str>,
@@ -93,7 +84,6 @@ pub(crate) struct Checked {
 /// A scenario of `morphcog simulate`, as far as the page supports it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Loaded {
-    /// The body.
     pub(crate) body: Body,
     /// The stimulus; `None` is all dark.
     pub(crate) stimulus: Option<crate::base::Grid<f64>>,
@@ -133,7 +123,6 @@ impl Service {
         ))
     }
 
-    /// Returns the current status.
     pub(crate) fn status(&self) -> ServiceStatus {
         ServiceStatus {
             version: env!("CARGO_PKG_VERSION"),
@@ -143,7 +132,6 @@ impl Service {
         }
     }
 
-    /// Checks if a body is viable.
     pub(crate) fn check(&self, body: &Body) -> Checked {
         let counts = body.counts();
         let connected = body.is_connected();
@@ -173,9 +161,6 @@ impl Service {
     }
 
     /// Reads a scenario of `morphcog simulate`.
-    ///
-    /// # Errors
-    /// Returns an error if it is invalid, or the page does not support it.
     pub(crate) fn load(&self, text: &str) -> Result<Loaded, HttpRefusal> {
         let scenario = Scenario::parse(text, "scenario")?;
         if *scenario.physics() != Physics::default() {
@@ -207,10 +192,6 @@ impl Service {
         })
     }
 
-    /// Turns a request into a plan for a simulation.
-    ///
-    /// # Errors
-    /// Returns an error if the request is invalid.
     pub(crate) fn plan(
         &self,
         request: request::SimulationRequest,

@@ -5,7 +5,6 @@ use crate::base::error::Error;
 /// A reason for refusing a request, with one clear line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum HttpRefusal {
-    /// The request is invalid.
     #[error("{0}")]
     Wrong(String),
     /// The request names something that does not exist.

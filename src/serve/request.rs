@@ -27,7 +27,6 @@ pub(crate) struct SubjectRequest {
     robot: Option<String>,
     /// The body, in place of a robot.
     body: Option<Body>,
-    /// The stimulus parameters of that body.
     encoding: Option<StimulusParams>,
 }
 
@@ -37,19 +36,15 @@ pub(crate) struct SubjectRequest {
 pub(crate) struct ImageChoice {
     /// A drawing: 0 paper … 255 ink, rows from the top.
     drawing: Option<Grid<u8>>,
-    /// A test image.
     image: Option<ImageName>,
     /// A finished stimulus, one number from 0 to 1 per voxel.
     stimulus: Option<Grid<f64>>,
 }
 
-/// A request to begin a simulation.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SimulationRequest {
-    /// The robot.
     subject: SubjectRequest,
-    /// The image.
     #[serde(default)]
     shown: ImageChoice,
     /// The control steps per image; the default is the robot's protocol.
@@ -67,32 +62,24 @@ pub(crate) struct SeeRequest {
     shown: ImageChoice,
 }
 
-/// A request to change a running simulation.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ChangeRequest {
-    /// The image from now on.
     pub(crate) shown: Option<ImageChoice>,
     /// The speed as a multiple of real time; 0: as fast as possible.
     pub(crate) speed: Option<f64>,
-    /// True to pause, false to continue.
     pub(crate) paused: Option<bool>,
 }
 
-/// The pace of a simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Pace {
     /// A multiple of real time.
     Times(f64),
-    /// As fast as possible.
     Free,
 }
 
 impl Pace {
     /// Creates a pace from a number, 0 for as fast as possible.
-    ///
-    /// # Errors
-    /// Returns an error if it is no valid speed.
     pub(crate) fn of(speed: f64) -> Result<Self, HttpRefusal> {
         match speed {
             0.0 => Ok(Pace::Free),
@@ -113,14 +100,11 @@ pub(crate) struct SeenPixels {
     pub(crate) label: Option<u8>,
 }
 
-/// A valid plan for a simulation.
 #[derive(Clone, Debug)]
 pub(crate) struct RolloutPlan {
-    /// The robot.
     pub(crate) who: Who,
     /// The first stimulus.
     pub(crate) seen: SeenPixels,
-    /// The pace.
     pub(crate) pace: Pace,
 }
 
@@ -168,9 +152,6 @@ impl SubjectRequest {
 
 impl ImageChoice {
     /// Converts the image to the stimulus of a body.
-    ///
-    /// # Errors
-    /// Returns an error if the image is invalid.
     pub(crate) fn seen(self, who: &Who, images: &ImageSets) -> Result<SeenPixels, HttpRefusal> {
         let (height, width) = (who.body.height(), who.body.width());
         let reduce = |pixels: &Grid<u8>| {
@@ -271,10 +252,6 @@ impl SimulationRequest {
 }
 
 impl SeeRequest {
-    /// Returns the body's stimulus.
-    ///
-    /// # Errors
-    /// Returns an error if the request is invalid.
     pub(crate) fn seen(
         self,
         catalogue: &RobotCatalogue,
@@ -285,10 +262,6 @@ impl SeeRequest {
     }
 }
 
-/// Parses a request.
-///
-/// # Errors
-/// Returns an error, with the key, if the request is invalid.
 pub(crate) fn read<T: serde::de::DeserializeOwned>(body: &[u8]) -> Result<T, HttpRefusal> {
     let text = std::str::from_utf8(body)
         .map_err(|_| HttpRefusal::Wrong("request: not UTF-8 text".to_string()))?;

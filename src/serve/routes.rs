@@ -11,17 +11,12 @@ use crate::serve::{Service, request, team};
 use serde::Deserialize;
 use serde_json::json;
 
-/// The reaction to a request.
 pub(crate) enum Reply {
-    /// Sends a complete response.
     Whole(HttpResponse),
-    /// Begins a simulation.
     Simulation(Box<RolloutPlan>),
-    /// Begins a team's walk.
     Team(Box<TeamPlan>),
 }
 
-/// Answers a request.
 pub(crate) fn reply(service: &Service, request: &Request) -> Reply {
     if let Err(refusal) = service.hosts.check(request) {
         return Reply::Whole(refusal);
@@ -114,7 +109,6 @@ pub(crate) fn reply(service: &Service, request: &Request) -> Reply {
     }
 }
 
-/// Converts a refusal to an HTTP response.
 pub(crate) fn refused(refusal: HttpRefusal) -> HttpResponse {
     let status = match refusal {
         HttpRefusal::Wrong(_) => 400,

@@ -190,9 +190,6 @@ fn simulation(
 
 /// Ends a simulation when the client closes its connection. A failed write would notice only later,
 /// and meanwhile the simulation would go on.
-///
-/// # Errors
-/// Returns an error if the system has no file or no thread left.
 fn end_with(stream: &TcpStream, control: &Arc<Control>) -> Result<(), Error> {
     let failed =
         |error: io::Error| Error::other(format!("the connection cannot be watched: {error}"));

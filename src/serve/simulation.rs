@@ -22,44 +22,30 @@ pub(super) const HEARTBEAT: Duration = Duration::from_millis(400);
 /// Maximum delay, in seconds, that a slow simulation tries to make up for.
 const MOST_BEHIND: f64 = 0.5;
 
-/// An event of a simulation.
 pub(crate) enum Event<'a> {
     /// The simulation begins, at rest.
     Begin {
-        /// The number of the simulation.
         id: u64,
-        /// The robot, its image and the durations.
         plan: &'a RolloutPlan,
-        /// The voxels with their corners.
         voxels: Vec<VoxelCorners>,
-        /// The initial pose.
         frame: Frame,
     },
-    /// The image changes.
     Seen {
-        /// The control steps so far.
         step: u32,
         /// The last control step with this image.
         until: u32,
-        /// The image.
         seen: &'a SeenPixels,
     },
-    /// The simulation advanced.
     Moments {
         /// The control steps at the last of the moments.
         step: u32,
         /// The moments, one per control step.
         frames: &'a [Frame],
-        /// The answer so far.
         answer: Reading,
     },
-    /// The simulation is paused.
     Still,
-    /// The simulation has ended.
     End {
-        /// The control steps simulated.
         step: u32,
-        /// The final answer.
         answer: Reading,
         /// The reason if it ended early.
         unstable: Option<String>,
@@ -70,10 +56,7 @@ pub(crate) enum Event<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Gone;
 
-/// Runs a simulation and passes its events to `tell`.
-///
-/// # Errors
-/// Returns [`Gone`] as soon as `tell` does.
+/// Runs a simulation and passes its events to `tell`; returns [`Gone`] as soon as that does.
 pub(crate) fn live(
     slot: &Slot,
     plan: &RolloutPlan,

@@ -16,7 +16,6 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The pending changes of a simulation.
 #[derive(Debug, Default)]
 struct Wishes {
     pace: Option<Pace>,
@@ -26,7 +25,6 @@ struct Wishes {
 
 /// The control of a simulation in another thread.
 pub(crate) struct Control {
-    /// The robot.
     pub(crate) who: Who,
     wishes: Mutex<Wishes>,
     changed: Condvar,
@@ -44,7 +42,6 @@ pub(crate) struct News {
 }
 
 impl Control {
-    /// Requests a change.
     pub(crate) fn change(
         &self,
         pace: Option<Pace>,
@@ -61,7 +58,6 @@ impl Control {
         self.changed.notify_all();
     }
 
-    /// Requests an immediate end.
     pub(crate) fn end(&self) {
         let wishes = lock(&self.wishes);
         self.over.store(true, Ordering::Relaxed);
@@ -69,7 +65,6 @@ impl Control {
         self.changed.notify_all();
     }
 
-    /// Returns true if an end was requested.
     pub(crate) fn is_over(&self) -> bool {
         self.over.load(Ordering::Relaxed)
     }
@@ -106,7 +101,6 @@ struct Running {
     closed: bool,
 }
 
-/// The running simulations.
 #[derive(Default)]
 pub(crate) struct Simulations {
     running: Mutex<Running>,
@@ -115,17 +109,12 @@ pub(crate) struct Simulations {
 /// A slot among [`Simulations`], freed on drop.
 pub(crate) struct Slot<'a> {
     simulations: &'a Simulations,
-    /// The number of the simulation.
     pub(crate) id: u64,
-    /// The control of the simulation.
     pub(crate) control: Arc<Control>,
 }
 
 impl Simulations {
     /// Reserves a slot.
-    ///
-    /// # Errors
-    /// Returns an error if all slots are taken.
     pub(crate) fn begin(&self, who: Who) -> Result<Slot<'_>, HttpRefusal> {
         let mut running = lock(&self.running);
         if running.closed || running.simulations.len() >= MAX_SIMULATIONS {
@@ -150,10 +139,6 @@ impl Simulations {
         })
     }
 
-    /// Returns the control of a running simulation.
-    ///
-    /// # Errors
-    /// Returns an error if no simulation has that number (any more).
     pub(crate) fn simulation(&self, id: u64) -> Result<Arc<Control>, HttpRefusal> {
         let found = lock(&self.running).simulations.get(&id).cloned();
         found.ok_or_else(|| {
@@ -161,12 +146,10 @@ impl Simulations {
         })
     }
 
-    /// Returns the number of running simulations.
     pub(crate) fn running(&self) -> usize {
         lock(&self.running).simulations.len()
     }
 
-    /// Returns the number of simulations begun so far.
     pub(crate) fn begun(&self) -> u64 {
         lock(&self.running).begun
     }

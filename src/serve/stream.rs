@@ -14,7 +14,6 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::{Value, json};
 
-/// Encodes an event.
 pub(crate) fn text(event: &Event) -> String {
     let (name, data) = match event {
         Event::Begin {
@@ -46,7 +45,6 @@ pub(crate) fn text(event: &Event) -> String {
     format!("event: {name}\ndata: {data}\n\n")
 }
 
-/// Encodes a team's event.
 pub(crate) fn of_team(event: &TeamEvent) -> String {
     let (name, data) = match event {
         TeamEvent::Begin {

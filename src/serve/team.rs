@@ -18,7 +18,6 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// Minimum number of robots in a team.
 const LEAST: usize = 2;
 
 /// The identity of a robot in the team.
@@ -26,11 +25,9 @@ const LEAST: usize = 2;
 pub(crate) struct Name {
     /// The number of its collection.
     pub(crate) archive: usize,
-    /// The id of the robot.
     pub(crate) robot: String,
     /// The task, such as "4|9".
     pub(crate) task: String,
-    /// The judge of its walks.
     pub(crate) judge: Readout,
 }
 
@@ -104,11 +101,9 @@ pub(crate) fn classes<'a>(judges: impl IntoIterator<Item = &'a Readout>) -> Vec<
     all.into_iter().collect()
 }
 
-/// A request to begin a team's walk.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct TeamRequest {
-    /// The image.
     #[serde(default)]
     shown: ImageChoice,
     /// The number of control steps; the default is the first robot's protocol.
@@ -117,24 +112,17 @@ pub(crate) struct TeamRequest {
     speed: Option<f64>,
 }
 
-/// A valid plan for a team's walk.
 #[derive(Clone, Debug)]
 pub(crate) struct TeamPlan {
     /// The robots with their stimuli; at least two.
     pub(crate) members: Vec<(Name, Who, SeenPixels)>,
     /// The common stimulus that covers all windows.
     pub(crate) together: SeenPixels,
-    /// The number of control steps.
     pub(crate) control_steps: u32,
-    /// The pace.
     pub(crate) pace: Pace,
 }
 
 impl TeamRequest {
-    /// Turns the request into a plan.
-    ///
-    /// # Errors
-    /// Returns an error if the request is invalid.
     pub(crate) fn plan(
         self,
         catalogue: &RobotCatalogue,
@@ -175,35 +163,24 @@ impl TeamRequest {
     }
 }
 
-/// An event of a team's walk.
 pub(crate) enum TeamEvent<'a> {
     /// The walk begins, at rest.
     Begin {
-        /// The number of the walk.
         id: u64,
-        /// The robots, their image and the duration.
         plan: &'a TeamPlan,
-        /// The classes to tell apart.
         classes: &'a [u8],
         /// Each robot's voxels and initial pose.
         stands: Vec<(Vec<VoxelCorners>, Frame)>,
     },
-    /// The walk advanced.
     Moment {
-        /// The control steps simulated.
         step: u32,
         /// Each robot's pose; `None` for one that has become unstable.
         frames: Vec<Option<Frame>>,
-        /// The votes so far.
         tally: Tally,
     },
-    /// The walk is paused.
     Still,
-    /// The walk has ended.
     End {
-        /// The control steps simulated.
         step: u32,
-        /// The final votes.
         tally: Tally,
     },
 }
@@ -214,9 +191,6 @@ struct Walker<'a> {
 }
 
 /// Runs a team's walk, its robots in parallel in a pool, and passes its events to `tell`.
-///
-/// # Errors
-/// Returns [`Gone`] as soon as `tell` does.
 pub(crate) fn live(
     slot: &Slot,
     plan: &TeamPlan,
@@ -304,7 +278,6 @@ pub(crate) fn live(
     }
 }
 
-/// Counts the votes so far.
 fn tally(walkers: &[Walker], judges: &[&Readout], classes: &[u8]) -> Tally {
     let moved = walkers
         .iter()

@@ -17,9 +17,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// The `format` of `audit.json`.
 pub(crate) const FORMAT: &str = "morphcog-audit";
-/// The newest version of its schema.
 pub(crate) const FORMAT_VERSION: u32 = 1;
 
 /// The content of `audit.json`.
@@ -135,7 +133,6 @@ impl Stored for AuditFile {
 }
 
 impl AuditFile {
-    /// Creates a file without robots.
     pub(crate) fn new(run: &str, run_sha256: String, elites: usize, criteria: &Criteria) -> Self {
         AuditFile {
             format: FORMAT.to_string(),
@@ -176,10 +173,6 @@ impl AuditFile {
         AuditFile::of_state(&run.fingerprint(), run_json)
     }
 
-    /// Reads the verdicts on the run with this fingerprint.
-    ///
-    /// # Errors
-    /// Returns the errors of [`of_run`](AuditFile::of_run).
     pub(crate) fn of_state(fingerprint: &str, run_json: &Path) -> Result<Self, Error> {
         let path = &AuditFile::path(run_json);
         let audit = Invocation::new("audit").option("archive", folder::archive(run_json));
@@ -214,10 +207,7 @@ impl AuditFile {
         Ok(file)
     }
 
-    /// Reads the verdicts on a run, or returns `None` if it has not been audited.
-    ///
-    /// # Errors
-    /// Returns an error if they are invalid, or about another state of the run.
+    /// Reads the verdicts on a run, or `None` without any; refuses those on another state of it.
     pub(crate) fn if_any(run: &RunFile, run_json: &Path) -> Result<Option<Self>, Error> {
         match exists(&AuditFile::path(run_json)) {
             true => AuditFile::of_run(run, run_json).map(Some),
@@ -226,9 +216,6 @@ impl AuditFile {
     }
 
     /// Reads the verdicts on the run with this fingerprint, from a folder or its subfolders.
-    ///
-    /// # Errors
-    /// Returns an error if there are none, or they are invalid.
     pub(crate) fn near(folder: &Path, run_sha256: &str) -> Result<Self, Error> {
         let here = if folder.as_os_str().is_empty() {
             Path::new(".")
@@ -350,9 +337,6 @@ impl AuditFile {
     }
 
     /// Writes the file, and its CSV beside it.
-    ///
-    /// # Errors
-    /// Returns an error if a file cannot be written.
     pub(crate) fn write(&self, path: &Path) -> Result<(), Error> {
         write_with_table(path, &self.to_json(), &self.to_csv(), [])
     }
@@ -374,7 +358,6 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// Returns the verdict in words.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Verdict::Physical => "physical",

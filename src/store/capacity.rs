@@ -11,9 +11,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// The `format` of `capacity.json`.
 pub(crate) const FORMAT: &str = "morphcog-capacity";
-/// The newest version of its schema.
 pub(crate) const FORMAT_VERSION: u32 = 1;
 
 /// The content of `capacity.json`.
@@ -213,7 +211,6 @@ impl CapacityFile {
         table::csv(columns, rows)
     }
 
-    /// Encodes the file as JSON.
     pub(crate) fn to_json(&self) -> String {
         // Numbers are finite and keys are text, so encoding cannot fail.
         serde_json::to_string_pretty(self).expect("JSON has all of it") + "\n"

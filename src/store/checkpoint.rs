@@ -56,7 +56,6 @@ impl KnownBodies {
         self.0.insert(key)
     }
 
-    /// Removes a body's key.
     pub(crate) fn remove(&mut self, key: &[u8; 16]) {
         self.0.remove(key);
     }
@@ -107,11 +106,8 @@ pub fn write(folder: &Path, checkpoint: &Checkpoint) -> Result<(), Error> {
     write_atomically(&newest, text.as_bytes()).map_err(failed(&newest))
 }
 
-/// Reads the newest valid checkpoint, or returns `None` if there never was one. It skips a damaged
-/// newest one and reports it with `warn`.
-///
-/// # Errors
-/// Returns an error if all checkpoints are damaged.
+/// Reads the newest valid checkpoint; `None` if there never was one, an error if all are damaged.
+/// It skips a damaged newest one and reports it with `warn`.
 pub(crate) fn read(
     folder: &Path,
     mut warn: impl FnMut(String),
@@ -134,9 +130,6 @@ pub(crate) fn read(
 
 /// Replaces a damaged newest checkpoint with the previous one, which the next write would otherwise
 /// discard.
-///
-/// # Errors
-/// Returns an error if it cannot be renamed.
 pub(crate) fn take_back(folder: &Path) -> Result<(), Error> {
     let [newest, previous] = CHECKPOINTS.map(|name| folder.join(name));
     let renamed = ownership::check(&newest)
@@ -204,7 +197,6 @@ mod tests {
         }
     }
 
-    /// Reads a checkpoint and whether there was a warning.
     fn read_quietly(folder: &Path) -> (Option<Checkpoint>, bool) {
         let mut warned = false;
         let found = read(folder, |text| warned = text.contains("checkpoint.json")).unwrap();

@@ -22,9 +22,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::mem::replace;
 use std::path::Path;
 
-/// The `format` of `eval.json`.
 pub(crate) const FORMAT: &str = "morphcog-eval";
-/// The newest version of its schema.
 pub(crate) const FORMAT_VERSION: u32 = 1;
 
 /// The tolerance of a share against its quotient: other programs round shares.
@@ -182,7 +180,6 @@ pub struct RobotReport {
 }
 
 impl RobotReport {
-    /// Returns the report without displacements.
     pub(crate) fn without_displacements(&self) -> Self {
         RobotReport {
             displacements: Vec::new(),
@@ -373,9 +370,6 @@ impl EvalFile {
     }
 
     /// Reads an evaluation of robots of these runs in their present state, and of no others.
-    ///
-    /// # Errors
-    /// Returns the errors of [`EvalFile::read`], or an error if the runs or their states differ.
     pub(crate) fn of_runs(path: &Path, runs: &[&RunFile]) -> Result<Self, Error> {
         let file = Self::read(path)?;
         let now: Vec<String> = runs.iter().map(|run| run.fingerprint()).collect();

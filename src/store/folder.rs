@@ -56,7 +56,6 @@ pub(crate) struct RunFolder {
     _lock: Lock,
 }
 
-/// Returns true if a process is working on the run in a folder.
 pub(crate) fn is_in_use(folder: &Path) -> bool {
     matches!(
         lock::state(&folder.join(LOCK)),
@@ -66,10 +65,6 @@ pub(crate) fn is_in_use(folder: &Path) -> bool {
 
 impl RunFolder {
     /// Creates the folder if necessary, and takes its lock.
-    ///
-    /// # Errors
-    /// If another process uses it, or it holds a run and `if_exists` says to refuse, or it cannot
-    /// be written, or it is stopped while it waits for a sign of life of another process.
     pub(crate) fn open(path: &Path, if_exists: IfExists, session: &Session) -> Result<Self, Error> {
         if shipped::is_named(path) {
             let text = "expected another name: so are runs called that lie elsewhere";
@@ -121,15 +116,11 @@ impl RunFolder {
         })
     }
 
-    /// Returns the path of the folder.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
     /// Writes a run: `elites.csv` and `run.json`.
-    ///
-    /// # Errors
-    /// If one cannot be written.
     pub(crate) fn write_run(&self, run: &RunFile) -> Result<(), Error> {
         for (name, content) in [
             (RUN_JSON, run.to_json().into_bytes()),
@@ -142,11 +133,7 @@ impl RunFolder {
     }
 
     /// Writes the run's config. An equal one stays as it is, with its comments: it may be the file
-    /// that this run was started with.
-    ///
-    /// # Errors
-    /// Returns an error if a different file of that name, without a run beside it, is in the way,
-    /// or the file cannot be written.
+    /// that this run was started with. A different one without a run beside it is an error.
     pub(crate) fn write_config(&self, config: &Config) -> Result<(), Error> {
         let path = self.path.join(CONFIG);
         let text = read_text(&path).ok();
@@ -169,7 +156,6 @@ impl RunFolder {
             .map_err(|error| Error::writing(&path, &error))
     }
 
-    /// Returns the file names of a run.
     pub(crate) fn files() -> [&'static str; 8] {
         let [newest, previous] = CHECKPOINTS;
         [
@@ -186,9 +172,6 @@ impl RunFolder {
 }
 
 /// Checks that a folder is free for a new run.
-///
-/// # Errors
-/// Returns an error if it holds a run.
 pub(crate) fn vacant(folder: &Path) -> Result<(), Error> {
     let of_run = RunFolder::files()
         .into_iter()
@@ -227,9 +210,6 @@ pub fn name_of(config: &str) -> String {
 /// Checks that results can be written to a file, with a CSV beside it, without overwriting each
 /// other or files of `of`, their run or result file: files of the run, or results of other commands
 /// under their usual names. `own` is the default name of these results.
-///
-/// # Errors
-/// Returns an error if they cannot.
 pub(crate) fn check_out(out: &Path, of: &Path, own: &str) -> Result<(), Error> {
     check_is_file_path(out)?;
     let refuse = |text: &str| Err(Error::argument("out", out.display(), text));
@@ -306,9 +286,6 @@ fn is_result(path: &Path) -> bool {
 
 /// Checks, before expensive work, that a file can be written and belongs to no run and no results
 /// of one.
-///
-/// # Errors
-/// Returns an error with the reason if it cannot.
 pub(crate) fn writable(path: &Path) -> Result<(), Error> {
     if is_result(path) {
         return Err(Error::usage(format!("{}: {OF_RUN}", path.display())));
@@ -324,9 +301,6 @@ fn not_of_run(path: &Path) -> Result<(), Error> {
 }
 
 /// Checks that a path can be a file's: it ends with a name.
-///
-/// # Errors
-/// Returns an error if it does not.
 pub(crate) fn check_is_file_path(path: &Path) -> Result<(), Error> {
     let last = path.as_os_str().as_encoded_bytes().last();
     let ends_open = last.is_some_and(|&byte| std::path::is_separator(byte.into()));
@@ -362,10 +336,7 @@ pub fn run_json(path: PathBuf) -> Result<Vec<PathBuf>, String> {
     }
 }
 
-/// Returns the only run at a path.
-///
-/// # Errors
-/// Returns the errors of [`run_json`], or an error if there are several.
+/// Returns the only run at a path; several are an error.
 pub(crate) fn one_run(path: PathBuf) -> Result<PathBuf, String> {
     let mut runs = run_json(path)?;
     match runs.as_slice() {
@@ -379,10 +350,6 @@ pub(crate) fn one_run(path: PathBuf) -> Result<PathBuf, String> {
     }
 }
 
-/// Returns the first run at a path.
-///
-/// # Errors
-/// Returns the errors of [`run_json`].
 pub(crate) fn first_run(path: PathBuf) -> Result<PathBuf, String> {
     Ok(run_json(path)?
         .into_iter()
@@ -457,9 +424,6 @@ fn above(archives: &[PathBuf]) -> PathBuf {
 }
 
 /// Returns the most recent run.json under `runs/`, which commands use by default.
-///
-/// # Errors
-/// Returns an error if there is none.
 pub(crate) fn newest_run() -> Result<PathBuf, Error> {
     let runs = std::fs::read_dir(RUNS).into_iter().flatten().flatten();
     let files = runs.map(|entry| entry.path().join(RUN_JSON));

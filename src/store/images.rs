@@ -43,7 +43,6 @@ impl HeldOut {
         *self == HeldOut::default()
     }
 
-    /// Returns the split of the dataset that has these images.
     pub(crate) fn split(&self) -> Split {
         match self {
             HeldOut::Test => Split::Test,
@@ -81,7 +80,6 @@ pub enum HowMany {
 }
 
 impl HowMany {
-    /// Returns true if the number allows an image of each class.
     pub(crate) fn has_each(self, classes: usize) -> bool {
         match self {
             HowMany::All => true,

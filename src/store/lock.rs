@@ -38,13 +38,10 @@ const LOOK: Duration = Duration::from_millis(500);
 /// The number of attempts to take a lock, because another process may hold it briefly for a check.
 const TRIES: u32 = 5;
 
-/// The process that holds a lock.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Holder {
-    /// The name of the machine.
     pub(crate) host: String,
-    /// The number of the process.
     pub(crate) process: u32,
     /// The heartbeat counter, which starts at the current time \[ns\]. Processes in containers may
     /// share numbers and machine names.
@@ -57,10 +54,8 @@ impl std::fmt::Display for Holder {
     }
 }
 
-/// The state of a lock file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum LockState {
-    /// No process holds it.
     Free,
     /// A process holds it, with its name if the file contains it.
     Held(Option<Holder>),
@@ -71,14 +66,11 @@ pub(crate) enum LockState {
     Silent(Holder),
 }
 
-/// A reason why a lock was not taken.
 #[derive(Debug)]
 pub(crate) enum LockRefusal {
-    /// Another process holds it, with its name if the file contains it.
     Held(Option<Holder>),
     /// A stop signal ended the wait.
     Stopped,
-    /// The file cannot be created or written.
     Io(io::Error),
     /// There is no thread for the heartbeat.
     NoThread(Error),
@@ -143,9 +135,6 @@ pub(crate) struct Lock {
 impl Lock {
     /// Takes a lock. If the file names a process that may be alive on another machine, it notes so
     /// and waits up to 25 seconds for the next heartbeat.
-    ///
-    /// # Errors
-    /// If another process has it; if it is stopped while it waits; what the system says.
     pub(crate) fn take(path: &Path, session: &Session) -> Result<Self, LockRefusal> {
         Lock::take_in(path, DEFAULT, session)
     }
@@ -153,9 +142,6 @@ impl Lock {
     /// Takes a lock that processes on several machines may want at once, as when a cluster's jobs
     /// begin with the same task. Locks of a file system may be limited to one machine, so it checks
     /// after half a second if the file still names this process.
-    ///
-    /// # Errors
-    /// As [`Lock::take`].
     pub(crate) fn take_contended(path: &Path, session: &Session) -> Result<Self, LockRefusal> {
         Lock::take_in(
             path,
@@ -245,7 +231,6 @@ impl Drop for Lock {
 struct Own {
     path: PathBuf,
     host: String,
-    /// The first heartbeat.
     first: u64,
     state: Mutex<Heart>,
     /// Wakes the heart at the end.
@@ -277,10 +262,7 @@ impl Own {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Checks that the file still names this process.
-    ///
-    /// # Errors
-    /// Returns [`Lost`] if it does not, or the system's error if the file cannot be read.
+    /// Checks that the file still names this process; if it does not, the error is [`Lost`].
     fn check(&self) -> io::Result<()> {
         self.check_at(&self.state())
     }
@@ -373,9 +355,6 @@ pub(crate) fn states(paths: &[PathBuf]) -> Vec<LockState> {
 
 /// Returns the state of a lock file at once. It takes the system's lock for a moment, to see if it
 /// is held.
-///
-/// # Errors
-/// Returns the system's error.
 pub(crate) fn state(path: &Path) -> io::Result<LockState> {
     use io::ErrorKind::{NotFound, PermissionDenied, ReadOnlyFilesystem};
     let file = match File::options().read(true).write(true).open(path) {
@@ -444,9 +423,6 @@ fn write(path: &Path, holder: &Holder) -> io::Result<()> {
 }
 
 /// Returns true if a heart beats, or another process takes the lock, within some time.
-///
-/// # Errors
-/// If it is stopped before it knows; what the system says.
 fn is_alive(
     path: &Path,
     before: &Holder,
@@ -486,7 +462,6 @@ mod tests {
         folder.path().join("lock")
     }
 
-    /// Returns a name like that of this process.
     fn own() -> Holder {
         let host = gethostname().to_string_lossy().into_owned();
         Holder {

@@ -20,17 +20,13 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Totals {
-    /// The number of offspring made.
     pub(crate) evaluations: u64,
-    /// The number of showings simulated.
     pub(crate) simulated: u64,
-    /// The number of showings saved because the body was known.
     pub(crate) saved_known_bodies: u64,
     /// The number of showings saved by stopping early (or because an earlier one was unstable).
     pub(crate) saved_early_stop: u64,
     /// The number of showings saved because another image looks the same to the sensors.
     pub(crate) saved_shared_rollouts: u64,
-    /// The number of unstable offspring.
     pub(crate) unstable: u64,
     /// The wall-clock time of all sessions of the run \[s\].
     #[serde(deserialize_with = "ranges::size")]
@@ -38,12 +34,10 @@ pub struct Totals {
 }
 
 impl Totals {
-    /// Returns the total of showings saved.
     pub(crate) fn saved(&self) -> u64 {
         self.saved_known_bodies + self.saved_early_stop + self.saved_shared_rollouts
     }
 
-    /// Counts one evaluation.
     pub(crate) fn count(&mut self, evaluation: &Evaluation) {
         self.simulated += evaluation.simulated;
         self.saved_early_stop += evaluation.stopped;
@@ -65,9 +59,6 @@ pub(crate) struct Metrics {
 impl Metrics {
     /// Opens the file to continue after `generations` lines; later lines, from before an
     /// interruption, are dropped.
-    ///
-    /// # Errors
-    /// Returns an error if it cannot be read or written.
     pub(crate) fn open(folder: &Path, generations: u64) -> Result<Self, Error> {
         let path = folder.join(METRICS);
         let old = match read_bytes(&path) {
@@ -108,9 +99,6 @@ impl Metrics {
     }
 
     /// Adds the line of a generation (from 0).
-    ///
-    /// # Errors
-    /// Returns an error if it cannot be written.
     pub(crate) fn write(
         &mut self,
         generation: u64,
@@ -146,10 +134,6 @@ impl Metrics {
         .map_err(|error| Error::writing(&self.path, &error))
     }
 
-    /// Flushes the lines to the system.
-    ///
-    /// # Errors
-    /// Returns an error if they cannot be written.
     pub(crate) fn flush(&mut self) -> Result<(), Error> {
         let written = ownership::check(&self.path).and_then(|()| self.file.flush());
         written.map_err(|error| Error::writing(&self.path, &error))
@@ -161,7 +145,6 @@ impl Metrics {
 pub(crate) struct Moment {
     /// The generation, from 0.
     pub(crate) generation: u64,
-    /// The number of offspring made so far.
     #[serde(deserialize_with = "ranges::size")]
     pub(crate) evaluations: f64,
     /// The share of possible cells with an elite.
@@ -179,9 +162,6 @@ pub(crate) struct Moment {
 }
 
 /// Reads the metrics.csv beside a run.json, without checking that they match.
-///
-/// # Errors
-/// Returns an error, with its line, if the file is missing or invalid.
 pub(crate) fn moments(archive: &Path) -> Result<Vec<Moment>, Error> {
     let path = archive.with_file_name(METRICS);
     let text = read_text(&path).map_err(|error| Error::reading(&path, &error))?;
@@ -192,9 +172,6 @@ pub(crate) fn moments(archive: &Path) -> Result<Vec<Moment>, Error> {
 
 /// Reads the metrics.csv of a run and checks that the line of its run.json's generation has the
 /// same figures. A run in progress may have more lines.
-///
-/// # Errors
-/// Returns the errors of [`moments`], or an error if the file is of another run or state.
 pub(crate) fn moments_of(run: &RunFile, archive: &Path) -> Result<Vec<Moment>, Error> {
     let moments = moments(archive)?;
     let Some(last) = run.generations.checked_sub(1) else {

@@ -2,8 +2,6 @@
 
 /// The verdicts of `audit`, beside `run.json`.
 pub const AUDIT_JSON: &str = "audit.json";
-
-/// The results of `capacity`, beside `eval.json`.
 pub(crate) const CAPACITY_JSON: &str = "capacity.json";
 
 /// The results of `eval` on test images, beside `run.json`.
@@ -11,19 +9,13 @@ pub(crate) const EVAL_JSON: &str = "eval.json";
 
 /// The results of `eval` on validation images.
 pub(crate) const EVAL_VALIDATION_JSON: &str = "eval-validation.json";
-
-/// The results of `response`, beside `run.json`.
 pub(crate) const RESPONSE_JSON: &str = "response.json";
-
-/// The results of `team`.
 pub(crate) const TEAM_JSON: &str = "team.json";
 /// The results of `team` on validation images.
 pub(crate) const TEAM_VALIDATION_JSON: &str = "team-validation.json";
 
 /// The rollouts of a training, beside `run.json`.
 pub(crate) const TRAINING_JSON: &str = "training.json";
-
-/// The state of a sweep's task, beside `run.json`.
 pub(crate) const TASK_JSON: &str = "task.json";
 
 /// The robots chosen on validation images, beside `run.json`.
@@ -34,21 +26,11 @@ pub(crate) const DATA_FOLDER: &str = "data-folder.json";
 
 /// The archive with everything that made it.
 pub(crate) const RUN_JSON: &str = "run.json";
-
-/// The resolved config.
 pub(crate) const CONFIG: &str = "config.toml";
 
 /// The elites for pyribs.
 pub(crate) const ELITES: &str = "elites.csv";
-
-/// The metrics per generation.
 pub(crate) const METRICS: &str = "metrics.csv";
-
-/// The file names of the newest and the previous checkpoint.
 pub(crate) const CHECKPOINTS: [&str; 2] = ["checkpoint.json", "checkpoint.previous.json"];
-
-/// The lock of a run's folder.
 pub(crate) const LOCK: &str = ".lock";
-
-/// The lock of a sweep's task.
 pub(crate) const TASK_LOCK: &str = ".task.lock";

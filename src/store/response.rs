@@ -19,9 +19,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// The `format` of `response.json`.
 pub(crate) const FORMAT: &str = "morphcog-response";
-/// The newest version of its schema.
 pub(crate) const FORMAT_VERSION: u32 = 1;
 
 /// The extensions of a robot's pictures beside the results.
@@ -441,9 +439,6 @@ impl ResponseFile {
 
     /// Writes the file, and its CSV beside it. If the results have changed, it first removes the
     /// `outdated` pictures, to be redrawn.
-    ///
-    /// # Errors
-    /// Returns an error if a file cannot be written.
     pub(crate) fn write(&self, path: &Path, outdated: &[[PathBuf; 2]]) -> Result<(), Error> {
         write_with_table(
             path,

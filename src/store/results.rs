@@ -29,9 +29,6 @@ pub(crate) trait Stored: DeserializeOwned {
 }
 
 /// Reads a file; `maker` is the command that makes one if there is none.
-///
-/// # Errors
-/// Returns an error, with its line or key, if the file is missing or invalid.
 pub(crate) fn read<T: Stored>(path: &Path, maker: Option<&'static str>) -> Result<T, Error> {
     let text = read_text(path).map_err(|error| match maker {
         Some(command) => Error::reading_or(
@@ -45,9 +42,6 @@ pub(crate) fn read<T: Stored>(path: &Path, maker: Option<&'static str>) -> Resul
 }
 
 /// Parses the text of a file; `name` appears in messages.
-///
-/// # Errors
-/// Returns the errors of [`read`].
 pub(crate) fn parse<T: Stored>(text: &str, name: &str) -> Result<T, Error> {
     let file: T = reading::read_versioned(text, name, T::FORMAT.0, T::FORMAT.1)?;
     file.validate()
@@ -55,10 +49,8 @@ pub(crate) fn parse<T: Stored>(text: &str, name: &str) -> Result<T, Error> {
         .map_err(|error| error.in_place(name))
 }
 
-/// Reads the file that results are about to replace, if it exists.
-///
-/// # Errors
-/// Returns an error if it cannot be read, because nobody knows what would be lost.
+/// Reads the file that results are about to replace, if it exists. If it cannot be read, that is an
+/// error, because nobody knows what would be lost.
 pub(crate) fn replaced<T: Stored>(path: &Path) -> Result<Option<T>, Error> {
     // A device or a pipe accepts whatever is written to it.
     if !path.is_file() {
@@ -85,9 +77,6 @@ pub(crate) fn by_lines(head: &impl Serialize, list: &[impl Serialize]) -> String
 
 /// Moves an unrelated file, with its table, out of the way of results: under its own name and the
 /// beginning of its SHA-256. `is_same` returns true if the file is about the same as the results.
-///
-/// # Errors
-/// If it cannot be read or renamed.
 pub(crate) fn make_room(
     path: &Path,
     is_same: impl FnOnce() -> bool,
@@ -123,9 +112,6 @@ pub(crate) fn make_room(
 /// Writes results, and their table beside them with the extension `csv`. The results are written
 /// last: if the process is killed in between, the old ones remain and are replaced later. If
 /// results change, it first removes their old `figures`, to be redrawn.
-///
-/// # Errors
-/// Returns an error if a file cannot be written or removed.
 pub(crate) fn write_with_table(
     path: &Path,
     json: &str,
@@ -167,7 +153,6 @@ mod tests {
     use crate::store::validation::ValidationFile;
     use serde_json::Value;
 
-    /// Parses the text of a file by its name; returns the error if it is refused.
     fn refusal(name: &str, text: &str) -> Option<Error> {
         fn of<T: Stored>(text: &str, name: &str) -> Option<Error> {
             parse::<T>(text, name).err()

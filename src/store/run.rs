@@ -24,9 +24,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// The `format` of `run.json`.
 pub(crate) const FORMAT: &str = "morphcog-run";
-/// The newest version of its schema; a reader refuses newer ones.
 pub(crate) const FORMAT_VERSION: u32 = 1;
 
 /// The arguments that stand for a run.
@@ -93,10 +91,6 @@ pub struct Dimensions {
 }
 
 impl Dimensions {
-    /// Returns the dimensions of a config's archive.
-    ///
-    /// # Errors
-    /// Returns an error if the config has no tasks.
     pub(crate) fn of(config: &Config) -> Result<Self, Error> {
         let grouping = config.grouping()?;
         let tasks: Vec<String> = grouping.tasks().iter().map(|split| split.name()).collect();
@@ -240,9 +234,6 @@ impl Stored for RunFile {
 
 impl RunFile {
     /// Creates a run of this program from its archive after some generations.
-    ///
-    /// # Errors
-    /// If the config has no tasks.
     pub(crate) fn new(
         name: &str,
         config: &Config,
@@ -307,9 +298,6 @@ impl RunFile {
     }
 
     /// Parses the text of the file; `name` appears in messages.
-    ///
-    /// # Errors
-    /// Returns the errors of [`RunFile::read`].
     pub(crate) fn parse(text: &str, name: &str) -> Result<Self, Error> {
         let run: RunFile = results::parse(text, name)?;
         Ok(RunFile {
@@ -323,12 +311,10 @@ impl RunFile {
         DescriptorSpace::new(names.iter().cloned().zip(bins.iter().copied()).collect())
     }
 
-    /// Returns the fitness function of its elites.
     pub(crate) fn fitness(&self) -> Fitness {
         self.config.evaluation.fitness
     }
 
-    /// Formats a fitness with its unit.
     pub(crate) fn in_units(&self, objective: f64) -> String {
         let unit = self
             .fitness()
@@ -353,7 +339,6 @@ impl RunFile {
             .reduce(|best, robot| if fitter(&best, &robot) { robot } else { best })
     }
 
-    /// Returns an elite's answers to the training images.
     pub(crate) fn answers(&self, robot: &Robot) -> Vec<Answer> {
         answers(
             &self.training_images,
@@ -475,9 +460,6 @@ impl RunFile {
 }
 
 /// Checks that runs, each with its path, differ, because duplicates would count twice.
-///
-/// # Errors
-/// Returns an error that names two equal runs.
 pub(crate) fn different<'a>(
     runs: impl IntoIterator<Item = (&'a Path, &'a RunFile)>,
 ) -> Result<(), Error> {

@@ -6,20 +6,14 @@ use crate::store::folder;
 use crate::store::run::RunFile;
 use std::path::{Path, PathBuf};
 
-/// A run, and where it lies.
 #[derive(Clone, Debug)]
 pub(crate) struct StoredRun {
     /// Its run.json; what else is known of its robots lies beside it.
     pub(crate) path: PathBuf,
-    /// Its content.
     pub(crate) run: RunFile,
 }
 
 impl StoredRun {
-    /// Reads a run.json.
-    ///
-    /// # Errors
-    /// As [`RunFile::read`].
     pub(crate) fn read(path: &Path) -> Result<Self, Error> {
         Ok(StoredRun {
             path: path.to_path_buf(),
@@ -27,10 +21,7 @@ impl StoredRun {
         })
     }
 
-    /// Checks that its robots have a task.
-    ///
-    /// # Errors
-    /// If they are gaits, which have no task yet; what teaches them one.
+    /// Checks that its robots have a task: gaits have none yet.
     pub(crate) fn has_task(&self) -> Result<(), Error> {
         if !self.run.config.measures_response() {
             return Ok(());

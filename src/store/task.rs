@@ -8,13 +8,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::Path;
 
-/// The `format` of the file.
 pub(crate) const FORMAT: &str = "morphcog-task";
-
-/// The version of its schema.
 pub(crate) const FORMAT_VERSION: u32 = 1;
 
-/// The state of a task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum TaskState {
@@ -24,14 +20,11 @@ pub(crate) enum TaskState {
     Running,
     /// It began, and no process works on it; the same command continues it.
     Stopped,
-    /// It failed.
     Failed,
-    /// It has not begun.
     Waiting,
 }
 
 impl TaskState {
-    /// All states.
     pub(crate) const ALL: [TaskState; 5] = [
         TaskState::Done,
         TaskState::Running,
@@ -40,7 +33,6 @@ impl TaskState {
         TaskState::Waiting,
     ];
 
-    /// Returns the name of the state.
     pub(crate) fn name(self) -> &'static str {
         match self {
             TaskState::Done => "done",
@@ -56,26 +48,20 @@ impl TaskState {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct TaskFile {
-    /// [`FORMAT`].
     pub(crate) format: String,
-    /// [`FORMAT_VERSION`].
     pub(crate) format_version: u32,
-    /// The version of the program that wrote the file.
     pub(crate) program_version: String,
     /// Everything that the run depends on: dotted keys with their values.
     pub(crate) settings: Settings,
     /// Requests that may change: generations or challengers, validation, steps after the run.
     pub(crate) asked: Value,
-    /// The state of the task.
     pub(crate) state: TaskState,
-    /// The error of a failed task.
     pub(crate) error: Option<String>,
     /// The wall-clock time of all sessions that ended by themselves or by a signal \[s\].
     pub(crate) seconds: f64,
 }
 
 impl TaskFile {
-    /// Creates the file of a task that begins.
     pub(crate) fn new(settings: Settings, asked: Value) -> Self {
         TaskFile {
             format: FORMAT.to_string(),
@@ -90,9 +76,6 @@ impl TaskFile {
     }
 
     /// Reads the file, or returns `None` if there is none.
-    ///
-    /// # Errors
-    /// Returns an error if it is invalid.
     pub(crate) fn read(path: &Path) -> Result<Option<Self>, Error> {
         let text = match read_text(path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
@@ -104,10 +87,6 @@ impl TaskFile {
             .map_err(|error| error.advice("delete it: its task goes on from its run"))
     }
 
-    /// Writes the file.
-    ///
-    /// # Errors
-    /// Returns an error if it cannot be written.
     pub(crate) fn write(&self, path: &Path) -> Result<(), Error> {
         let text =
             serde_json::to_string(self).expect("keys are text and numbers are finite") + "\n";

@@ -14,9 +14,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The `format` of `team.json`.
 pub(crate) const FORMAT: &str = "morphcog-team";
-/// The newest version of its schema.
 pub(crate) const FORMAT_VERSION: u32 = 1;
 
 /// The names of the figures beside it: the confusion matrix, and the poster of all bodies.

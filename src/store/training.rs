@@ -8,7 +8,6 @@ use crate::store::results::Stored;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The `format` of the file, and the version of its schema.
 pub(crate) const FILE: (&str, u32) = ("morphcog-training", 2);
 
 /// The run whose gaits a robot was trained from, wherever that run was.

@@ -9,10 +9,8 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The `format` of the file, and the version of its schema.
 const FORMAT: (&str, u32) = ("morphcog-trainings", 2);
 
-/// The known trainings.
 #[derive(Debug)]
 pub(crate) struct Trainings {
     path: PathBuf,
@@ -50,10 +48,7 @@ impl Stored for Content {
 
 impl Trainings {
     /// Reads the trainings beside a result file: `capacity.trainings.json` beside `capacity.json`.
-    /// Without the file there are none.
-    ///
-    /// # Errors
-    /// Returns an error if the file cannot be read, because its trainings would be lost.
+    /// Without the file there are none; an unreadable one is an error, because they would be lost.
     pub(crate) fn read(results: &Path) -> Result<Self, Error> {
         let path = results.with_extension("trainings.json");
         let empty = || Content {
@@ -78,7 +73,6 @@ impl Trainings {
             .map_or(&[], Vec::as_slice)
     }
 
-    /// Adds the next trainings of a size.
     pub(crate) fn extend(&mut self, key: &str, size: usize, trained: &[Trained]) {
         let sizes = self.content.trainings.entry(key.to_string()).or_default();
         sizes
@@ -87,10 +81,6 @@ impl Trainings {
             .extend(trained.iter().map(|t| (t.accuracy, t.parameters)));
     }
 
-    /// Writes the trainings.
-    ///
-    /// # Errors
-    /// Returns an error if they cannot be written.
     pub(crate) fn write(&self) -> Result<(), Error> {
         let text = serde_json::to_string(&self.content)
             .map_err(|error| Error::other(error.to_string()))?

@@ -9,10 +9,8 @@ use crate::base::session::Session;
 pub(crate) struct Unwritten(Option<Error>);
 
 impl Unwritten {
-    /// Records the outcome of writing, and warns when it begins to fail.
-    ///
-    /// # Errors
-    /// If the folder is no longer this process's: to try again would not help.
+    /// Records the outcome of writing, and warns when it begins to fail. The error is that the
+    /// folder is no longer this process's: to try again would not help.
     pub(crate) fn tried(
         &mut self,
         outcome: Result<(), Error>,
@@ -45,7 +43,6 @@ mod tests {
 
     #[test]
     fn a_failure_is_told_once_and_forgotten_when_writing_succeeds() {
-        /// Counts warnings.
         struct Counting(AtomicU32);
         impl Observer for Counting {
             fn failed(&self, _: &Error, _: &str) {

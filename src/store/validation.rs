@@ -12,7 +12,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// The `format` of `validation.json`, and the version of its schema.
 pub(crate) const FORMAT: (&str, u32) = ("morphcog-validation", 1);
 
 /// The results of a robot on all validation images.
@@ -114,9 +113,6 @@ impl ValidationFile {
     }
 
     /// Reads a file, or returns `None` if there is none.
-    ///
-    /// # Errors
-    /// Returns an error if it cannot be read.
     pub(crate) fn read(path: &Path) -> Result<Option<Self>, Error> {
         if !exists(path) {
             return Ok(None);
@@ -131,9 +127,6 @@ impl ValidationFile {
 
 /// Returns the best robots of a run on validation images, chosen as in its config, if they are
 /// known for its present state.
-///
-/// # Errors
-/// If the file that says so cannot be read.
 pub(crate) fn ranking(source: &StoredRun) -> Result<Option<Vec<Validated>>, Error> {
     let ValidationConfig { images, best } = source.run.config.validation;
     let file = ValidationFile::read(&source.path.with_file_name(VALIDATION_JSON))?;
@@ -152,9 +145,6 @@ pub(crate) fn ranking(source: &StoredRun) -> Result<Option<Vec<Validated>>, Erro
 
 /// Returns the largest number of images by which robots in the `validation.json` beside a run were
 /// chosen, or `None` without such a file.
-///
-/// # Errors
-/// If it cannot be read.
 pub(crate) fn most_images(source: &StoredRun) -> Result<Option<usize>, Error> {
     let Some(file) = ValidationFile::read(&source.path.with_file_name(VALIDATION_JSON))? else {
         return Ok(None);

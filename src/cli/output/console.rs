@@ -57,7 +57,6 @@ struct Streams {
     lost: bool,
 }
 
-/// Returns the number of columns of the terminal.
 fn columns() -> usize {
     let told = crossterm::terminal::size()
         .ok()
@@ -116,7 +115,6 @@ impl Console {
         }
     }
 
-    /// Returns the mode.
     pub(crate) fn mode(&self) -> Mode {
         self.mode
     }

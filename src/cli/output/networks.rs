@@ -120,9 +120,6 @@ fn unknown() -> String {
 }
 
 /// Writes the figure beside a `capacity.json`, as SVG and as PNG; returns the files.
-///
-/// # Errors
-/// Returns an error if the figure cannot be made or written.
 pub(crate) fn figure(file: &CapacityFile, out: &Path) -> Result<[PathBuf; 2], PictureError> {
     let figure = plot::capacity(file);
     let files = FIGURES.map(|ending| out.with_extension(ending));

@@ -16,16 +16,12 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// A format of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Format {
-    /// An animated GIF.
     Gif,
-    /// A self-contained page for the browser.
     Html,
     /// The last frame as PNG.
     Png,
-    /// A live view in the terminal.
     Terminal,
 }
 
@@ -106,9 +102,6 @@ impl PicturesWanted {
     }
 
     /// Takes the format from a file's extension; without one, chooses a file for each of `formats`.
-    ///
-    /// # Errors
-    /// Returns an error if the extension is no known format, or a file cannot be written.
     pub(crate) fn named(path: &Path, formats: &[Format]) -> Result<Self, Error> {
         folder::check_is_file_path(path)?;
         let files = match path
@@ -160,9 +153,6 @@ pub(crate) fn folder(archive: &Path) -> PathBuf {
 }
 
 /// Makes the pictures, reports their files and the robot's walk, and returns the files.
-///
-/// # Errors
-/// Returns an error if a picture cannot be made or written.
 pub(crate) fn make(
     console: &Console,
     replay: &Replay,

@@ -21,7 +21,6 @@ const STEPS_PER_SECOND: f64 = 50.0;
 const USUAL: (u16, u16) = (80, 24);
 const LARGEST: (usize, usize) = (140, 46);
 
-/// The action of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Key {
     Pause,
@@ -74,10 +73,8 @@ impl Player {
     }
 }
 
-/// Plays a recording, or writes only its last frame if stdout is no terminal for people.
-///
-/// # Errors
-/// Returns an error if a signal stops it. The terminal is restored in any case.
+/// Plays a recording, or writes only its last frame if stdout is no terminal for people. The
+/// terminal is restored in any case.
 pub(crate) fn play(console: &Console, walk: &Walk) -> Result<(), Error> {
     let variable = |name| std::env::var(name).unwrap_or_default();
     let depth = Depth::of(

@@ -121,9 +121,6 @@ fn row(robot: &RobotResponse, is_taught: bool, has_window: bool) -> Vec<String> 
 }
 
 /// Writes the pictures of the robots.
-///
-/// # Errors
-/// Returns an error if a picture cannot be made or written.
 pub(crate) fn pictures(console: &Console, finished: &ResponseOutcome) -> Result<(), PictureError> {
     let ResponseOutcome { file, pictures, .. } = finished;
     for (robot, [svg, png]) in file.robots.iter().zip(pictures) {

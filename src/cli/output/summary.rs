@@ -118,7 +118,6 @@ pub(crate) fn evolution(console: &Console, finished: &EvolveOutcome, out: &Path,
     console.suggest("     ", &format!("morphcog eval --archive {archive}"));
 }
 
-/// Writes the results of a training.
 pub(crate) fn training(console: &Console, finished: &train::TrainOutcome, out: &Path) {
     let train::TrainOutcome {
         run,
@@ -151,7 +150,6 @@ pub(crate) fn training(console: &Console, finished: &train::TrainOutcome, out: &
     console.line(&format!("wrote {}", out.display()));
 }
 
-/// Writes the results of the robots chosen on validation images.
 pub(crate) fn validation(console: &Console, best: &[Validated]) {
     if console.mode() == Mode::Json {
         return console.event("validated", &best);
@@ -292,7 +290,6 @@ pub(crate) fn evaluation(
     }
 }
 
-/// Writes the simulation speeds of this machine.
 pub(crate) fn speeds(console: &Console, speeds: &[Speed]) {
     if console.mode() == Mode::Json {
         return speeds
@@ -327,7 +324,6 @@ pub(crate) fn speeds(console: &Console, speeds: &[Speed]) {
     });
 }
 
-/// Lists the published robots.
 pub(crate) fn gallery(console: &Console, robots: &[Published]) {
     let rows = robots.iter().map(|robot| {
         let counts = robot.body.counts();
@@ -383,7 +379,6 @@ pub(crate) fn schemas(console: &Console, schemas: &[(&str, &str)]) {
     console.table(&["schema", "what it is of"], &rows);
 }
 
-/// Writes the results of a download.
 pub(crate) fn fetched(console: &Console, files: &[Fetched]) {
     for file in files {
         let how = match &file.outcome {
@@ -394,7 +389,6 @@ pub(crate) fn fetched(console: &Console, files: &[Fetched]) {
     }
 }
 
-/// Writes the facts about a dataset.
 pub(crate) fn dataset(console: &Console, found: &FoundDataset) {
     let info = &found.info;
     if console.mode() == Mode::Json {

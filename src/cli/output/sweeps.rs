@@ -71,9 +71,6 @@ fn in_short(all: &[TaskStatus]) -> String {
 }
 
 /// Writes the results of a sweep to files and to the console.
-///
-/// # Errors
-/// Returns an error if a file cannot be written.
 pub(crate) fn collected(
     console: &Console,
     name: &str,

@@ -11,9 +11,6 @@ use std::path::Path;
 
 /// Writes the results of a test: a line per robot, the team's answers, the baselines without
 /// bodies, and pictures beside `out`, if that was written.
-///
-/// # Errors
-/// Returns an error if a picture cannot be made or written.
 pub(crate) fn team(console: &Console, file: &TeamFile, out: Option<&Path>) -> Result<(), Error> {
     let pictures = match out.filter(|_| file.answers.is_some()) {
         Some(out) => pictures(file, out)?,

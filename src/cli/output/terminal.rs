@@ -20,7 +20,6 @@ enum Pixel {
     Image(f64),
 }
 
-/// The colour depth of a terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Depth {
     /// No colours: letters stand for materials.

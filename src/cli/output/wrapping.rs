@@ -56,7 +56,6 @@ pub(crate) fn wrapped_command(about: &str, command: &str, columns: usize) -> Vec
     fill(&all, INDENT, columns)
 }
 
-/// Wraps a cell of a table.
 pub(crate) fn wrapped_cell(text: &str, columns: usize) -> Vec<String> {
     fill(&words(text, Kind::Cell), 0, columns)
 }

@@ -20,7 +20,6 @@ use std::path::{Path, PathBuf};
 
 /// The images that networks train on, wait on and are tested on, with their classes.
 pub(crate) struct Images {
-    /// Images of each run.
     training: Vec<Vec<Seen>>,
     waiting: Vec<Seen>,
     test: Vec<Seen>,
@@ -203,9 +202,6 @@ impl Task {
     }
 
     /// Trains the network of this number; the runs take turns in lending their images.
-    ///
-    /// # Errors
-    /// Returns [`Stopped`](crate::base::error::ErrorKind::Stopped) if the session was stopped.
     pub(crate) fn train(
         &self,
         size: usize,

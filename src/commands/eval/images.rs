@@ -21,14 +21,10 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Training images per class on which the single-pixel baseline is chosen.
 const PIXEL_IMAGES_PER_CLASS: usize = 500;
 
-/// Held-out images to draw.
 #[derive(Clone, Copy)]
 pub(crate) struct Draw {
-    /// The number of images in all.
     pub(crate) images: HowMany,
-    /// Test or validation images.
     pub(crate) split: HeldOut,
-    /// Seed of the draw.
     pub(crate) seed: u64,
     /// Images by which robots are chosen at the same time, if they are; `None` in it: as many as
     /// the config says.
@@ -40,7 +36,6 @@ pub(crate) struct HeldOutImages<'a> {
     config: &'a Config,
     dataset: &'a Dataset,
     draw: Draw,
-    /// The images.
     pub(crate) images: Vec<ImageRef>,
     /// Each image as all robots see it together.
     stimuli: Vec<Grid<f64>>,
@@ -49,9 +44,6 @@ pub(crate) struct HeldOutImages<'a> {
 impl<'a> HeldOutImages<'a> {
     /// Draws images, evenly divided between the classes; the first classes get the remainder. The
     /// robots of the runs see images together under `config`.
-    ///
-    /// # Errors
-    /// Returns an error if there are too few images, or fewer are requested than classes.
     pub(crate) fn draw(
         config: &'a Config,
         sources: &[StoredRun],
@@ -95,9 +87,6 @@ impl<'a> HeldOutImages<'a> {
     }
 
     /// Returns the images as robots of a run see them, in order.
-    ///
-    /// # Errors
-    /// Returns an error if an image cannot be drawn or seen.
     pub(crate) fn seen_by(&self, config: &Config) -> Result<Cow<'_, [Grid<f64>]>, Error> {
         match config.stimulus == self.config.stimulus {
             true => Ok(Cow::Borrowed(&self.stimuli)),
@@ -107,9 +96,6 @@ impl<'a> HeldOutImages<'a> {
     }
 
     /// Returns the baselines of these tasks, by the names that the runs give them.
-    ///
-    /// # Errors
-    /// Returns an error if an image cannot be drawn or seen.
     pub(crate) fn baselines<'t>(
         &self,
         sources: &[StoredRun],

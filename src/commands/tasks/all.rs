@@ -24,7 +24,6 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// Summary of the tasks.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TasksSummary {
     /// Number of tasks done, now or before.
@@ -39,9 +38,6 @@ pub(crate) struct TasksSummary {
 
 /// Checks that tasks that have not begun have images, also for their tests. Otherwise they would
 /// fail one by one, or after hours of work.
-///
-/// # Errors
-/// Returns an error if images are missing.
 pub(crate) fn check_data<'a>(
     tasks: impl Iterator<Item = (usize, &'a Task)>,
     place: &TaskFolders,
@@ -114,9 +110,6 @@ pub(crate) fn check_test(
 }
 
 /// Runs all tasks, `jobs` at once; `None`: one per core. A failing task does not stop others.
-///
-/// # Errors
-/// Returns an error if the folder cannot be made, or there are no images.
 pub(crate) fn run_all(
     tasks: &[Task],
     place: &TaskFolders,
@@ -235,7 +228,6 @@ pub(crate) fn run_all(
     Ok(summary)
 }
 
-/// Progress over all tasks.
 struct All<'o> {
     session: &'o Session<'o>,
     /// Generations of tasks that were done before.
@@ -244,7 +236,6 @@ struct All<'o> {
     parts: Vec<AtomicU64>,
 }
 
-/// A task's part of the progress.
 struct Part<'a, 'o> {
     all: &'a All<'o>,
     index: usize,

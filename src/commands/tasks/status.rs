@@ -14,14 +14,11 @@ use std::path::{Path, PathBuf};
 /// Bytes at the end of a metrics.csv that hold its last whole row; rows have about 150.
 const ROW: u64 = 4096;
 
-/// Status of a task, as its folder says.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct TaskStatus {
     /// Its number, from 1.
     pub(crate) task: usize,
-    /// Its name.
     pub(crate) name: String,
-    /// Its state.
     pub(crate) state: TaskState,
     /// Generations done and requested; `None` for a training.
     pub(crate) generations: Option<[u64; 2]>,
@@ -33,10 +30,6 @@ pub(crate) struct TaskStatus {
     pub(crate) about: Option<String>,
 }
 
-/// Returns the status of all tasks.
-///
-/// # Errors
-/// Returns an error if a folder cannot be read.
 pub(crate) fn status(tasks: &[Task], place: &TaskFolders) -> Result<Vec<TaskStatus>, Error> {
     let locks: Vec<PathBuf> = tasks
         .iter()

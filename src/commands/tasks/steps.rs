@@ -18,9 +18,6 @@ use crate::task::answer;
 use std::time::Instant;
 
 /// Runs a task, or goes on with it.
-///
-/// # Errors
-/// Returns an error if it failed or was stopped, or another process works on it.
 pub(crate) fn run(task: &Task, place: &TaskFolders, session: &Session) -> Result<(), Error> {
     let folder = place.folder(task);
     std::fs::create_dir_all(&folder).map_err(|error| Error::writing(&folder, &error))?;
@@ -86,9 +83,6 @@ pub(super) fn lacking(task: &Task, place: &TaskFolders) -> Option<String> {
 }
 
 /// Returns the test that a task's plan requests, if any.
-///
-/// # Errors
-/// Returns an error if its selection of robots cannot be read.
 pub(crate) fn test_of(
     task: &Task,
     place: &TaskFolders,

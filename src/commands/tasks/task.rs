@@ -22,25 +22,20 @@ use std::path::{Path, PathBuf};
 pub(crate) struct Task {
     /// Its name, which its run folder shares.
     pub(crate) name: String,
-    /// Its run.
     pub(crate) run: Run,
-    /// Steps after the run.
     pub(crate) steps: Steps,
     /// Keys that differ between tasks, with their values as text, for tables.
     pub(crate) varied: Vec<(String, String)>,
 }
 
-/// The run of a task.
 #[derive(Clone, Debug)]
 pub(crate) enum Run {
     /// `evolve`, with the name of the run, and the groups of classes if the plan names them.
     Evolve(Box<Config>, String, Option<Groups>),
-    /// `train`.
     Train(Box<TrainRun>),
 }
 
 impl Run {
-    /// Returns the config of the run.
     pub(crate) fn config(&self) -> &Config {
         match self {
             Run::Evolve(config, ..) => config,
@@ -57,22 +52,17 @@ impl Run {
     }
 }
 
-/// A training.
 #[derive(Clone, Debug)]
 pub(crate) struct TrainRun {
     /// The run.json whose robots are trained.
     pub(crate) archive: PathBuf,
     /// SHA-256 of this file.
     pub(crate) sha256: String,
-    /// Its robots to train.
     pub(crate) robots: String,
-    /// The two groups of classes.
     pub(crate) groups: Groups,
-    /// Seed of all random numbers.
     pub(crate) seed: u64,
     /// Keys that differ from those of the run.
     pub(crate) set: Vec<String>,
-    /// The resulting config.
     pub(crate) config: Config,
 }
 
@@ -181,7 +171,6 @@ pub(crate) struct TaskFolders {
 }
 
 impl TaskFolders {
-    /// Returns the run folder of a task.
     pub(crate) fn folder(&self, task: &Task) -> PathBuf {
         self.out.join(&task.name)
     }
@@ -211,7 +200,6 @@ impl Task {
             .collect()
     }
 
-    /// Returns the control steps per actuation cycle.
     pub(crate) fn cycle_steps(&self) -> u32 {
         match &self.run {
             Run::Evolve(config, ..) => config.physics.cycle_steps,
@@ -280,9 +268,6 @@ impl Task {
 }
 
 /// Refuses tasks whose folders hold runs of other settings, all at once.
-///
-/// # Errors
-/// Returns an error for each of them, with the keys that differ.
 pub(crate) fn check_folders(tasks: &[Task], place: &TaskFolders) -> Result<(), Vec<Error>> {
     let check = |(number, task): (usize, &Task)| {
         let path = place.folder(task).join(TASK_JSON);

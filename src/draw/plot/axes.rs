@@ -83,7 +83,6 @@ impl Axis {
         }
     }
 
-    /// Returns the positions of the ticks.
     pub(crate) fn ticks(&self) -> Vec<f64> {
         let first = (self.from / self.step - 1e-6).ceil();
         let count = ((self.to / self.step + 1e-6).floor() - first).clamp(-1.0, 100.0) as i32;
@@ -92,7 +91,6 @@ impl Axis {
             .collect()
     }
 
-    /// Formats a number for a tick.
     pub(crate) fn label(&self, value: f64) -> String {
         let decimals = (-libm::log10(self.step).floor()).clamp(0.0, 6.0) as usize;
         grouped(&number::fixed(value, decimals))
@@ -147,7 +145,6 @@ impl Plot {
         ]
     }
 
-    /// Draws grid lines at the ticks.
     pub(crate) fn grid(&self, canvas: &mut Canvas, across: bool, up: bool) {
         let pen = Pen::new(scales::GRID, 0.5);
         let [left, top] = self.at;
@@ -161,7 +158,6 @@ impl Plot {
         }
     }
 
-    /// Draws the lower axis, with its name below.
     pub(crate) fn lower_axis(&self, canvas: &mut Canvas, name: Option<&str>) {
         let bottom = self.at[1] + self.size[1];
         let pen = Pen::new(colour::INK, LINE);
@@ -187,7 +183,6 @@ impl Plot {
         }
     }
 
-    /// Draws the left axis, with its name beside it.
     pub(crate) fn left_axis(&self, canvas: &mut Canvas, name: &str) {
         self.left_axis_beside(canvas, name, self.y.labels_width());
     }

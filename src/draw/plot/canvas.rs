@@ -13,26 +13,20 @@ pub(crate) const TEXT: f64 = 7.2;
 /// Size of headings, points.
 pub(crate) const HEADING: f64 = 8.2;
 
-/// The part of a text that is fixed at its position.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Anchor {
-    /// The left end.
     #[default]
     Start,
-    /// The middle.
     Middle,
-    /// The right end.
     End,
 }
 
-/// The style of a text.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TextStyle {
     pub(crate) size: f64,
     pub(crate) bold: bool,
     pub(crate) colour: Colour,
     pub(crate) anchor: Anchor,
-    /// True if the text runs upwards.
     pub(crate) upwards: bool,
 }
 
@@ -49,7 +43,6 @@ impl Default for TextStyle {
 }
 
 impl TextStyle {
-    /// Returns the default style, anchored in the middle.
     pub(crate) fn middle() -> Self {
         TextStyle {
             anchor: Anchor::Middle,
@@ -57,7 +50,6 @@ impl TextStyle {
         }
     }
 
-    /// Returns the default style, anchored at the right end.
     pub(crate) fn end() -> Self {
         TextStyle {
             anchor: Anchor::End,
@@ -65,18 +57,15 @@ impl TextStyle {
         }
     }
 
-    /// Sets the colour.
     pub(crate) fn colour(self, colour: Colour) -> Self {
         TextStyle { colour, ..self }
     }
 
-    /// Makes the text bold.
     pub(crate) fn bold(self) -> Self {
         TextStyle { bold: true, ..self }
     }
 }
 
-/// The style of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Pen {
     pub(crate) colour: Colour,
@@ -86,7 +75,6 @@ pub(crate) struct Pen {
 }
 
 impl Pen {
-    /// Creates a pen for solid lines.
     pub(crate) fn new(colour: Colour, width: f64) -> Self {
         Pen {
             colour,
@@ -95,7 +83,6 @@ impl Pen {
         }
     }
 
-    /// Makes the line dashed.
     pub(crate) fn dashed(self, dash: f64, gap: f64) -> Self {
         Pen {
             dashes: Some([dash, gap]),
@@ -144,25 +131,18 @@ pub(super) enum Ink {
     Line(Pen),
 }
 
-/// A piece of a path.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Piece {
-    /// A line through points.
     Line(Vec<[f64; 2]>),
     /// A line through points and back to the first.
     Polygon(Vec<[f64; 2]>),
-    /// A rectangle from its top left corner.
     Rectangle {
-        /// The top left corner.
         at: [f64; 2],
-        /// Width and height.
         size: [f64; 2],
     },
     /// A horizontal line to the right.
     Level {
-        /// The left end.
         from: [f64; 2],
-        /// The length.
         length: f64,
     },
 }
@@ -174,17 +154,14 @@ pub(crate) struct Canvas {
 }
 
 impl Canvas {
-    /// Creates an empty canvas.
     pub(crate) fn new() -> Self {
         Canvas::default()
     }
 
-    /// Returns the elements in drawing order.
     pub(super) fn elements(&self) -> &[Element] {
         &self.elements
     }
 
-    /// Draws a filled rectangle from its top left corner.
     pub(crate) fn rectangle(&mut self, at: [f64; 2], size: [f64; 2], fill: Colour) {
         self.elements.push(Element::Rectangle {
             at,
@@ -193,7 +170,6 @@ impl Canvas {
         });
     }
 
-    /// Draws the outline of a rectangle.
     pub(crate) fn frame(&mut self, at: [f64; 2], size: [f64; 2], pen: Pen) {
         self.elements.push(Element::Rectangle {
             at,
@@ -202,7 +178,6 @@ impl Canvas {
         });
     }
 
-    /// Draws a line between two points.
     pub(crate) fn line(&mut self, from: [f64; 2], to: [f64; 2], pen: Pen) {
         self.path(vec![Piece::Line(vec![from, to])], pen);
     }
@@ -217,7 +192,6 @@ impl Canvas {
         }
     }
 
-    /// Draws the line of a path.
     pub(crate) fn path(&mut self, pieces: Vec<Piece>, pen: Pen) {
         self.elements.push(Element::Path {
             pieces,
@@ -233,7 +207,6 @@ impl Canvas {
         });
     }
 
-    /// Draws a filled circle.
     pub(crate) fn dot(&mut self, at: [f64; 2], radius: f64, fill: Colour) {
         self.elements.push(Element::Dot { at, radius, fill });
     }

@@ -45,7 +45,6 @@ impl Figure {
         }
     }
 
-    /// Sets the background.
     #[must_use]
     pub(crate) fn on(self, background: Background) -> Self {
         Figure { background, ..self }
@@ -56,7 +55,6 @@ impl Figure {
         self.size
     }
 
-    /// Returns the title, a single line.
     pub(crate) fn title(&self) -> &str {
         &self.title
     }
@@ -92,18 +90,11 @@ impl Figure {
     }
 
     /// Returns the figure as PNG for print, with [`PRINT`] pixels per inch or as many as possible.
-    ///
-    /// # Errors
-    /// Returns the errors of [`png`](Figure::png).
     pub(crate) fn print(&self) -> Result<Vec<u8>, PictureError> {
         self.png(self.fitting(PRINT))
     }
 
     /// Returns the figure as PNG with `dpi` pixels per inch; the file states its intended size.
-    ///
-    /// # Errors
-    /// Returns [`PictureError::Figure`] if it would have no pixels or too many, or
-    /// [`PictureError::Encode`] if encoding fails.
     pub(crate) fn png(&self, dpi: u32) -> Result<Vec<u8>, PictureError> {
         let scale = f64::from(dpi) / 72.0;
         let [width, height] = self.size.map(|points| (points * scale).ceil());

@@ -122,7 +122,6 @@ pub(crate) fn response(found: &RobotResponse, task: Option<&str>, of: &str) -> F
     )
 }
 
-/// Returns the notes beside the map.
 fn notes(found: &RobotResponse, task: Option<&str>) -> Vec<String> {
     let places = found.places.len();
     let certain = found

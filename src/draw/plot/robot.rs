@@ -130,7 +130,6 @@ pub(crate) fn outline(
     }
 }
 
-/// Draws the outline of a body.
 pub(crate) fn body_outline(canvas: &mut Canvas, at: [f64; 2], cell: f64, body: &Body, pen: Pen) {
     outline(
         canvas,

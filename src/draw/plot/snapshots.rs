@@ -21,9 +21,6 @@ const FAINTEST: f64 = 0.22;
 
 /// Plots poses of a simulation, one per `every` control steps (0: chosen from the walk), earlier
 /// ones fainter; a panel per stimulus. `of` names the robot.
-///
-/// # Errors
-/// Returns [`PictureError::Recording`] if the recording cannot be drawn.
 pub(crate) fn snapshots(
     recording: &Recording,
     every: usize,

@@ -29,9 +29,6 @@ const HEIGHTS: [f64; 2] = [90.0, 210.0];
 /// Plots x over time, which runs downwards. Every row is the robot from above at that time, darker
 /// where its voxels are compressed. There is a panel per rollout, with dashed lines where the
 /// stimulus changes. `of` names the robot.
-///
-/// # Errors
-/// Returns [`PictureError::Recording`] if the recording cannot be drawn.
 pub(crate) fn spacetime(recording: &Recording, of: &str) -> Result<Figure, PictureError> {
     let walk = Walk::new(recording)?;
     let mut rollouts = Vec::<Range<usize>>::new();

@@ -51,7 +51,6 @@ pub(super) fn button(
     )
 }
 
-/// Describes a robot in a line.
 fn about(dossier: &Dossier, robot: &Robot) -> String {
     let counts = robot.voxels;
     let verdict = dossier
@@ -119,7 +118,6 @@ pub(super) fn bodies(run: usize, dossier: &Dossier, rollouts: &Rollouts, spell: 
     format!("<div class=\"bodies\">{buttons}</div>\n")
 }
 
-/// Draws a body's voxels by material.
 fn picture(body: &Body) -> String {
     let (height, width) = (body.voxels().height(), body.voxels().width());
     let mut out = format!(

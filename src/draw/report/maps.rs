@@ -34,7 +34,6 @@ pub(super) fn played(dossier: &Dossier, most: usize) -> Vec<&Robot> {
 }
 
 impl Rollouts {
-    /// Simulates and packs the rollouts.
     pub(crate) fn record(
         gathered: &Gathered,
         most: usize,
@@ -78,7 +77,6 @@ impl Rollouts {
             .then(|| format!("rollout-{run}-{robot}"))
     }
 
-    /// Returns the elements that hold the rollouts.
     pub(crate) fn elements(&self) -> String {
         let element = |((run, robot), rollout): (&(usize, String), &String)| {
             format!(

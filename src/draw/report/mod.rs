@@ -26,14 +26,11 @@ const SCRIPT: &str = concat!(
 /// Spells a command as its users type it.
 pub(crate) type Spell<'a> = &'a dyn Fn(&Invocation) -> String;
 
-/// The content of a page.
 #[derive(Clone, Copy)]
 pub(crate) struct Content<'a> {
-    /// The runs and the findings about them.
     pub(crate) gathered: &'a Gathered,
     /// Maximum number of robots of each run that can be played, the fittest first.
     pub(crate) rollouts: usize,
-    /// Spells the commands that reproduce the results.
     pub(crate) spell: Spell<'a>,
 }
 
@@ -50,9 +47,6 @@ impl Content<'_> {
     }
 
     /// Returns the page as text; `simulated` receives the number of rollouts simulated so far.
-    ///
-    /// # Errors
-    /// Returns an error if a rollout cannot be drawn.
     pub(crate) fn page(&self, simulated: &(dyn Fn(u64) + Sync)) -> Result<String, PictureError> {
         let Gathered {
             runs,
@@ -103,7 +97,6 @@ fn figure(figure: &Figure, class: &str) -> String {
     )
 }
 
-/// Summarises several runs together.
 fn overview(runs: &[Dossier], together: &Findings) -> String {
     let mut out = "<section id=\"together\">\n<h2>All runs together</h2>\n".to_string();
     let are_trained = runs.iter().all(|dossier| dossier.run.origin.is_some());
@@ -177,7 +170,6 @@ fn run(
     out + "</section>\n"
 }
 
-/// Summarises the test results.
 fn findings(found: &Findings) -> String {
     let mut out = String::new();
     if let Some(report) = found

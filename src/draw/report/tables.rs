@@ -44,7 +44,6 @@ fn or_none<T>(value: Option<T>, text: impl Fn(T) -> String) -> String {
     value.map_or("–".to_string(), text)
 }
 
-/// Returns a table with a row per run.
 pub(super) fn runs(runs: &[Dossier]) -> String {
     let row = |dossier: &Dossier| {
         let stats = dossier.run.stats;
@@ -71,7 +70,6 @@ pub(super) fn runs(runs: &[Dossier]) -> String {
     table(&headers, runs.iter().map(row))
 }
 
-/// Returns a table with a row per training.
 pub(super) fn trainings(runs: &[Dossier]) -> String {
     let row = |dossier: &Dossier| {
         let run = &dossier.run;
@@ -378,7 +376,6 @@ pub(super) fn capacity(file: &CapacityFile) -> String {
     )
 }
 
-/// Formats a capacity for a table.
 pub(crate) fn size(capacity: Option<Crossing>) -> String {
     capacity.map_or_else(|| "no match".to_string(), |size| size.to_string())
 }

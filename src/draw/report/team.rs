@@ -29,7 +29,6 @@ const MOST_BYTES: usize = 9_000_000;
 /// Minimum control steps from one moment to the next: ten moments a cycle.
 const LEAST_APART: usize = 5;
 
-/// Returns the number of rollouts to simulate.
 pub(super) fn count(team: &Team) -> usize {
     team.images.len() * team.file.members.len()
 }

@@ -60,7 +60,6 @@ pub(super) fn contents(runs: &[Dossier]) -> String {
     )
 }
 
-/// Describes what fitness rewards.
 fn rewarded(fitness: Fitness) -> &'static str {
     match fitness {
         Fitness::Min => {
@@ -78,7 +77,6 @@ fn rewarded(fitness: Fitness) -> &'static str {
     }
 }
 
-/// Describes how the robots evolved.
 fn evolved(dossier: &Dossier) -> String {
     let run = &dossier.run;
     let evaluations = dossier.effort().map_or(String::new(), |(_, count)| {
@@ -103,7 +101,6 @@ fn evolved(dossier: &Dossier) -> String {
     )
 }
 
-/// Describes how the robot was trained.
 fn trained(run: &RunFile, origin: &Origin) -> String {
     let TrainConfig {
         random_images,
@@ -132,7 +129,6 @@ fn trained(run: &RunFile, origin: &Origin) -> String {
     )
 }
 
-/// Describes the perturbations that alternate in a training.
 fn perturbed(run: &RunFile) -> String {
     let ByTurns {
         start,
