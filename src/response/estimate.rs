@@ -8,7 +8,7 @@ use crate::base::random::{Purpose, stream};
 use crate::base::session::Session;
 use crate::base::stop::Stopped;
 use crate::body::Material;
-use crate::response::lesson::{DesignProblem, Example};
+use crate::response::design_problem::{DesignProblem, Example};
 use crate::response::regression::{RandomRollout, Response};
 use crate::task::fitness::ENOUGH;
 use std::f64::consts::{PI, SQRT_2};
@@ -137,9 +137,9 @@ impl<'a> Half<'a> {
         let any = vec![Material::SensorExpand; slopes.len()];
         let solved = |side: f64, draw: u64| {
             let examples = self.examples.iter().map(|example| (*example, *intercept));
-            let mut lesson = DesignProblem::predicted(examples, slopes, &any, side);
-            lesson.solve_from_many(&mut stream(seed, Purpose::Training, 0, 2 * number + draw));
-            (lesson.objective(), lesson.design())
+            let mut problem = DesignProblem::predicted(examples, slopes, &any, side);
+            problem.solve_from_many(&mut stream(seed, Purpose::Training, 0, 2 * number + draw));
+            (problem.objective(), problem.design())
         };
         let (right, left) = (solved(1.0, 0), solved(-1.0, 1));
         if right.0 >= left.0 {

@@ -13,7 +13,7 @@ pub(crate) const CHOICES: [Material; 3] = [
     Material::SensorShrink,
 ];
 
-/// Materials that a [design problem](super::lesson) chooses from: sensors, with which a response is
+/// Materials that a [design problem](super::design_problem) chooses from: sensors, with which a response is
 /// measured. A soft voxel differs from one at rest: it has no goal, so the sides that it shares
 /// take its neighbour's goal, and its springs have another stiffness (`physics.md`, "Actuation").
 pub(crate) const SENSORS: [Material; 2] = [CHOICES[CHOSEN.start], CHOICES[CHOSEN.start + 1]];

@@ -4,7 +4,7 @@
 //! d ≈ c + Σ Jᵢ wᵢ. Linear regression finds the *slopes* J from a body whose soft voxels and
 //! sensors are all expanding sensors, under images with independent random pixels: an intervention
 //! on every voxel by itself. (Natural images only reveal what goes together.) The slopes belong to
-//! the gait, so they serve every task: a [`Lesson`](super::lesson::DesignProblem) finds its sensors.
+//! the gait, so they serve every task: a [`DesignProblem`](super::design_problem::DesignProblem) finds its sensors.
 
 use nalgebra::{DMatrix, DVector};
 

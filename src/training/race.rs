@@ -12,8 +12,8 @@ use crate::base::Grid;
 use crate::base::random::{Purpose, Stream, stream};
 use crate::body::{Body, Material};
 use crate::genome::other_voxel;
+use crate::response::design_problem::{DesignProblem, Example};
 use crate::response::gait::{CHOICES, Design, Gait};
-use crate::response::lesson::{DesignProblem, Example};
 use crate::response::regression::{Evidence, Moments};
 use crate::sim::{Physics, width};
 use crate::task::fitness::clipped_margin;
@@ -258,10 +258,10 @@ impl<'a> Refinement<'a> {
             .collect();
         let examples: Vec<&Example> = examples.iter().collect();
         let design = gait.design();
-        let mut lesson = DesignProblem::new(&examples, &slopes, &design);
+        let mut problem = DesignProblem::new(&examples, &slopes, &design);
         let places: Vec<usize> = (0..design.len()).filter(|_| random.unit() < 0.5).collect();
-        lesson.best_changes(&places, 1 << random.below(MOST_SENSORS_LOG2 as usize + 1));
-        let solved = lesson.design();
+        problem.best_changes(&places, 1 << random.below(MOST_SENSORS_LOG2 as usize + 1));
+        let solved = problem.design();
         if solved != design {
             return gait.built(&solved);
         }

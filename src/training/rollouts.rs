@@ -2,7 +2,7 @@
 
 use crate::base::Grid;
 use crate::body::Body;
-use crate::response::lesson::Example;
+use crate::response::design_problem::Example;
 
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Image {

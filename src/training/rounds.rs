@@ -9,8 +9,8 @@
 use crate::base::Grid;
 use crate::base::random::{Purpose, Stream, stream};
 use crate::body::{Body, Material};
+use crate::response::design_problem::DesignProblem;
 use crate::response::gait::{Design, Gait, SENSORS};
-use crate::response::lesson::DesignProblem;
 use crate::response::regression::{Evidence, Moments, Response, dot};
 use crate::sim::Physics;
 use crate::task::fitness::clipped_margin;
@@ -129,7 +129,7 @@ impl<'a> GaitTrainer<'a> {
             .expect("there are images");
         let mut evidence = response.evidence.clone();
         evidence.fade(RANDOM_WEIGHT);
-        let mut teacher = GaitTrainer {
+        let mut trainer = GaitTrainer {
             gait,
             physics,
             images,
@@ -146,16 +146,16 @@ impl<'a> GaitTrainer<'a> {
             rounds: 0,
             rollouts: 0,
         };
-        let any = teacher.design.clone();
+        let any = trainer.design.clone();
         for (draw, side) in [(0, 1.0), (1, -1.0)] {
-            let mut random = teacher.random(Use::First, draw);
+            let mut random = trainer.random(Use::First, draw);
             let (predicted, design) =
-                teacher.solved(&any, side, |lesson| lesson.solve_from_many(&mut random));
-            if predicted > teacher.predicted {
-                (teacher.predicted, teacher.design, teacher.side) = (predicted, design, side);
+                trainer.solved(&any, side, |problem| problem.solve_from_many(&mut random));
+            if predicted > trainer.predicted {
+                (trainer.predicted, trainer.design, trainer.side) = (predicted, design, side);
             }
         }
-        teacher
+        trainer
     }
 
     /// Returns the predicted mean clipped margin of the latest design over all training images.
@@ -178,7 +178,7 @@ impl<'a> GaitTrainer<'a> {
         let (measured, off) = self.measured(&mut random, rollouts)?;
         let before = self.design.clone();
         let (predicted, design) =
-            self.solved(&before, self.side, |lesson| lesson.solve(&mut random));
+            self.solved(&before, self.side, |problem| problem.solve(&mut random));
         let round = Round {
             round: self.rounds,
             predicted: self.predicted,
@@ -432,9 +432,9 @@ impl<'a> GaitTrainer<'a> {
             .images
             .iter()
             .map(|image| (&image.example, self.intercepts[image.condition]));
-        let mut lesson = DesignProblem::predicted(examples, &self.slopes, from, side);
-        solve(&mut lesson);
-        (lesson.objective(), lesson.design())
+        let mut problem = DesignProblem::predicted(examples, &self.slopes, from, side);
+        solve(&mut problem);
+        (problem.objective(), problem.design())
     }
 }
 
@@ -454,8 +454,8 @@ fn nowhere(displacement: Option<f64>) -> f64 {
 mod tests {
     use super::*;
     use crate::body::Body;
+    use crate::response::design_problem::Example;
     use crate::response::gait::{CHOICES, random_image};
-    use crate::response::lesson::Example;
     use crate::response::regression::RandomRollout;
     use std::convert::Infallible;
 
@@ -547,20 +547,20 @@ mod tests {
         ) -> (TrainedDesign, Vec<Round>, [f64; 2]) {
             let (gait, physics) = (self.gait.clone(), self.physics.clone());
             let images = self.images(images);
-            let mut teacher = GaitTrainer::new(
+            let mut trainer = GaitTrainer::new(
                 &gait,
                 &self.response(response),
                 images.clone(),
                 PLAN,
                 &physics,
             );
-            let first = (teacher.design.clone(), teacher.side);
+            let first = (trainer.design.clone(), trainer.side);
             let mut rounds = Vec::new();
             for _ in 0..PLAN.rounds {
-                let Ok(round) = teacher.round(self);
+                let Ok(round) = trainer.round(self);
                 rounds.push(round);
             }
-            let Ok(taught) = teacher.finish(self, |_| ());
+            let Ok(taught) = trainer.finish(self, |_| ());
             let mut share = |(body, side): (Body, f64)| {
                 let stimuli: Vec<_> = images.iter().map(|image| image.stimulus.clone()).collect();
                 let conditions: Vec<_> = images.iter().map(|image| image.condition).collect();
@@ -679,9 +679,9 @@ mod tests {
                 final_images,
                 ..PLAN
             };
-            let teacher =
+            let trainer =
                 GaitTrainer::new(&gait, &response, images.clone(), plan, &planted.physics);
-            let (numbers, _) = teacher.compared_on(draw);
+            let (numbers, _) = trainer.compared_on(draw);
             assert_eq!(
                 numbers.iter().collect::<BTreeSet<_>>().len(),
                 final_images,

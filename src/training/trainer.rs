@@ -10,8 +10,8 @@ use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
 use crate::images::training::TrainingImages;
 use crate::images::whereabouts::stimulus_of;
+use crate::response::design_problem::Example;
 use crate::response::gait::Gait;
-use crate::response::lesson::Example;
 use crate::response::probing::{Probing, response};
 use crate::response::regression::Response;
 use crate::store::images::ImageRef;
@@ -171,7 +171,7 @@ impl Trainer<'_> {
             report_response(session, &walker.robot.id, gait, &response);
             let seeing = self.with_window(walker, &response, log, session)?;
             let images = self.images(gait, &seeing)?;
-            let mut teacher = GaitTrainer::new(gait, &response, images, plan, &config.physics);
+            let mut trainer = GaitTrainer::new(gait, &response, images, plan, &config.physics);
             let conditions = probing.conditions();
             log.begins_round(robot, 1, &plan);
             let mut rollouts = Kept {
@@ -179,22 +179,22 @@ impl Trainer<'_> {
                 conditions,
                 log,
             };
-            match teacher.first(&mut rollouts)? {
+            match trainer.first(&mut rollouts)? {
                 First::Round(round) => report_round(session, robot, &round, &plan),
                 First::Own(fitness) => report_own(session, robot, fitness),
             }
             if best
                 .as_ref()
-                .is_none_or(|(_, _, best)| teacher.predicted() > best.predicted())
+                .is_none_or(|(_, _, best)| trainer.predicted() > best.predicted())
             {
-                best = Some((walker, seeing, teacher));
+                best = Some((walker, seeing, trainer));
             }
             if plan.rounds == 0 {
                 // Predictions of designs that nothing has changed rank no robots.
                 break;
             }
         }
-        let Some((walker, seeing, mut teacher)) = best else {
+        let Some((walker, seeing, mut trainer)) = best else {
             let text =
                 "none of the chosen robots is stable with random images: there is nothing to train";
             return Err(Error::input(text.to_string()).remedy(Remedy::ChooseRobots(None)));
@@ -206,10 +206,10 @@ impl Trainer<'_> {
         };
         for number in 2..=plan.rounds {
             rollouts.log.begins_round(&walker.robot.id, number, &plan);
-            let round = teacher.round(&mut rollouts)?;
+            let round = trainer.round(&mut rollouts)?;
             report_round(session, &walker.robot.id, &round, &plan);
         }
-        let challengers = teacher.challengers();
+        let challengers = trainer.challengers();
         rollouts.log.begins_challenges(challengers);
         let has_simulated = Arc::clone(&rollouts.log.has_simulated);
         has_simulated.store(false, Ordering::Relaxed);
@@ -220,7 +220,7 @@ impl Trainer<'_> {
             }
             report_challenge(session, challenge, challengers);
         };
-        Ok((walker, seeing, teacher.finish(&mut rollouts, told)?))
+        Ok((walker, seeing, trainer.finish(&mut rollouts, told)?))
     }
 }
 

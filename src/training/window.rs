@@ -12,8 +12,8 @@ use crate::base::stop::Stopped;
 use crate::body::Material;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
+use crate::response::design_problem::{DesignProblem, Example};
 use crate::response::gait::Gait;
-use crate::response::lesson::{DesignProblem, Example};
 use crate::response::regression::Response;
 use crate::store::images::ImageRef;
 use crate::task::grouping::balanced;
@@ -139,9 +139,9 @@ impl<'a> Windows<'a> {
         let any = vec![Material::SensorExpand; gait.places().len()];
         let solved = |(draw, side)| {
             let examples = examples.iter().map(|example| (example, response.intercept));
-            let mut lesson = DesignProblem::predicted(examples, &response.slopes, &any, side);
-            lesson.solve(&mut stream(self.config.seed, Purpose::Windows, 1, draw));
-            lesson.objective()
+            let mut problem = DesignProblem::predicted(examples, &response.slopes, &any, side);
+            problem.solve(&mut stream(self.config.seed, Purpose::Windows, 1, draw));
+            problem.objective()
         };
         [(0, 1.0), (1, -1.0)]
             .into_iter()

@@ -84,7 +84,7 @@ impl DesignProblem {
             examples.iter().map(|e| e.choices[place][choice]).collect()
         };
         let total: f64 = examples.iter().map(|example| example.weight).sum();
-        let mut lesson = DesignProblem {
+        let mut problem = DesignProblem {
             widths: (0..slopes.len())
                 .map(|place| [0, 1, 2].map(|choice| column(place, choice)))
                 .collect(),
@@ -102,8 +102,8 @@ impl DesignProblem {
             design: design.iter().map(|material| choice(*material)).collect(),
             objective: 0.0,
         };
-        lesson.count();
-        lesson
+        problem.count();
+        problem
     }
 
     /// Makes a problem whose examples have the displacements predicted for `design`, by the slopes
@@ -244,7 +244,7 @@ mod tests {
     }
 
     /// Makes a gait of one row, and images for it.
-    fn lesson(places: usize, images: usize, seed: u64) -> (Gait, Vec<Example>, Vec<f64>) {
+    fn problem(places: usize, images: usize, seed: u64) -> (Gait, Vec<Example>, Vec<f64>) {
         let body: Body = "6".repeat(places).parse().unwrap();
         let gait = Gait::of(&body).unwrap();
         let mut random = random(seed);
@@ -288,7 +288,7 @@ mod tests {
     fn the_best_design_of_small_gaits_is_found_as_a_rule_and_else_one_nearly_as_good() {
         let mut is_best = 0;
         for seed in 0..20 {
-            let (gait, examples, slopes) = lesson(6, 40, seed);
+            let (gait, examples, slopes) = problem(6, 40, seed);
             let all: Vec<&Example> = examples.iter().collect();
             let every = (0..64_usize).map(|code| -> Design {
                 (0..6)
@@ -298,9 +298,9 @@ mod tests {
             let best = every
                 .map(|design| objective(&gait, &examples, &slopes, &design))
                 .fold(f64::MIN, f64::max);
-            let mut lesson = DesignProblem::new(&all, &slopes, &gait.design());
-            lesson.solve_from_many(&mut random(seed));
-            let (found, design) = (lesson.objective(), lesson.design());
+            let mut problem = DesignProblem::new(&all, &slopes, &gait.design());
+            problem.solve_from_many(&mut random(seed));
+            let (found, design) = (problem.objective(), problem.design());
             assert!((found - objective(&gait, &examples, &slopes, &design)).abs() < 1e-9);
             assert!(found > best - 0.05, "seed {seed}: {found} of {best}");
             is_best += u32::from(found > best - 1e-9);
