@@ -118,6 +118,7 @@ fn name(archive: &Path, [a, b]: &[Vec<u8>; 2], seed: Option<u64>) -> String {
         .and_then(Path::file_name)
         .map(|name| name.to_string_lossy());
     let of = match shipped::name(archive) {
+        Some((of, "")) => of,
         Some((_, name)) => name,
         None => folder.as_deref().unwrap_or("run"),
     };

@@ -52,6 +52,10 @@ fn place(path: &Path) -> Option<io::Result<Place>> {
     let (name, file) = parts(path)?;
     match name.strip_prefix(atlas::PREFIX) {
         Some(run) => Some(atlas::file(run, file).map(Place::Compressed)),
+        None if name == gallery::PUBLISHED => Some(Err(io::Error::other(
+            "the published robots fill no archive, and have no files; \
+             audit, eval, response, replay and plot body take them",
+        ))),
         None => gallery::text(name, file).map(|text| Ok(Place::Shipped(text))),
     }
 }
