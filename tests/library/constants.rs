@@ -1,28 +1,10 @@
 //! The constants of physics: each is felt by a golden simulation, whose bits are pinned
 //! (`crates/sim/tests/pinned_numbers.rs`; those of runs: `tests/slow/pinned_runs.rs`), or pinned here.
 
-use crate::common::reference::references;
-use morphcog::sim::{Physics, World};
+use crate::common::reference::{bits, references};
+use morphcog::sim::Physics;
 use rayon::prelude::*;
 use serde_json::{Map, Value};
-
-/// The bits of all points before the first control step and after each, until the simulation
-/// becomes unstable.
-fn bits(mut world: World) -> impl Iterator<Item = Vec<u8>> {
-    let mut begun = false;
-    std::iter::from_fn(move || {
-        if std::mem::replace(&mut begun, true) {
-            world.step().ok()?;
-        }
-        Some(
-            world
-                .points()
-                .flatten()
-                .flat_map(|coordinate| coordinate.to_bits().to_le_bytes())
-                .collect(),
-        )
-    })
-}
 
 /// The constants whose least change no golden simulation feels, with the bits of their defaults.
 const UNFELT: [(&str, u64); 8] = [

@@ -5,8 +5,8 @@
 
 mod common;
 
-use common::{Reference, references, sensitive};
-use morphcog_sim::{Physics, World};
+use common::{Reference, bits, references, sensitive};
+use morphcog_sim::Physics;
 use sha2::{Digest, Sha256};
 
 /// SHA-256 over the bits of x and y of all points before the first control step and after each, in
@@ -97,24 +97,6 @@ const SIMULATIONS: [(&str, &str); 21] = [
         "171e0303da5f0a00f48aeebeeb20e921e1a6f6b78394f353eabb9e8f05d1b712",
     ),
 ];
-
-/// The bits of all points before the first control step and after each, until the simulation
-/// becomes unstable.
-fn bits(mut world: World) -> impl Iterator<Item = Vec<u8>> {
-    let mut begun = false;
-    std::iter::from_fn(move || {
-        if std::mem::replace(&mut begun, true) {
-            world.step().ok()?;
-        }
-        Some(
-            world
-                .points()
-                .flatten()
-                .flat_map(|coordinate| coordinate.to_bits().to_le_bytes())
-                .collect(),
-        )
-    })
-}
 
 fn hex(bytes: &[u8]) -> String {
     Sha256::digest(bytes)

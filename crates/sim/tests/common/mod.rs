@@ -115,3 +115,21 @@ pub fn sensitive() -> Vec<Reference> {
     assert_eq!(all.len(), 4);
     all
 }
+
+/// The bits of all points before the first control step and after each, until the simulation
+/// becomes unstable.
+pub fn bits(mut world: World) -> impl Iterator<Item = Vec<u8>> {
+    let mut begun = false;
+    std::iter::from_fn(move || {
+        if std::mem::replace(&mut begun, true) {
+            world.step().ok()?;
+        }
+        Some(
+            world
+                .points()
+                .flatten()
+                .flat_map(|coordinate| coordinate.to_bits().to_le_bytes())
+                .collect(),
+        )
+    })
+}
