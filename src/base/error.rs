@@ -43,7 +43,7 @@ impl ErrorKind {
 /// An error: what went wrong, where, what was expected, and what to do about it.
 ///
 /// An error knows the field of a command's options that it is about, and its remedies, but no
-/// option of the command line: whoever prints it spells both for its users.
+/// option of the command line: the front end that prints it spells both for its users.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Error {
     /// The kind of failure.

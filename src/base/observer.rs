@@ -2,11 +2,14 @@
 
 use crate::base::error::Error;
 use serde::Serialize;
+use std::path::Path;
 
 /// Receives the progress of a command, from several threads at once. Every method is optional.
 pub trait Observer: Sync {
     /// Reports in words that a step begins, or that something was found.
     fn note(&self, _text: &str) {}
+    /// Reports that a file was written; `about` is what else there is to say of it, if anything.
+    fn wrote(&self, _path: &Path, _about: &str) {}
     /// Reports that counted work begins; the work before it has ended.
     fn begins(&self, _work: &Work) {}
     /// Reports the total done so far of the work that began last.

@@ -75,7 +75,7 @@ impl<'a> Session<'a> {
             .data(self.data.clone())
     }
 
-    pub(crate) fn folder(&self) -> Option<&Path> {
+    pub(crate) fn data_folder(&self) -> Option<&Path> {
         self.data.as_deref()
     }
 

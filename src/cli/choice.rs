@@ -73,8 +73,14 @@ pub(super) fn one_by_one(
     data: Option<PathBuf>,
     console: &Console,
 ) -> Result<Vec<Named>, Error> {
-    let (archives, _) = robots::archives(search.archives.clone(), search.robots.clone())?;
+    // Resolved once: what is warned of is what is searched.
+    let (archives, robots) = robots::archives(search.archives.clone(), search.robots.clone())?;
     say_simulated(&archives, console);
+    let search = &one_by_one::RobotChoice {
+        archives,
+        robots,
+        ..search.clone()
+    };
     // Only a search on validation images stops in an orderly way; signals end all else at once.
     match search.robots.validated() {
         Some(_) => in_session(console, Resources::of(None, data), |session| {

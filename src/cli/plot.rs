@@ -134,9 +134,6 @@ pub(super) fn run(args: PlotArgs, console: &Console) -> Result<(), Error> {
         },
     };
     let made = plot::plot(&wanted, &Session::new(&NEVER, &Reporter::new(console)))?;
-    made.files
-        .iter()
-        .for_each(|path| console.line_about(path, &format!("wrote {}", path.display())));
     sweeps::differences(console, &made.progress);
     Ok(())
 }

@@ -1,15 +1,16 @@
 //! `morphcog report`: parses its arguments and runs it.
 
-use crate::analysis::dossier;
 use crate::base::error::Error;
-use crate::base::number;
+use crate::base::session::Session;
+use crate::base::stop::NEVER;
 use crate::cli::choice;
 use crate::cli::choice::{Archives, Runs, run_jsons};
 use crate::cli::explain::spell;
 use crate::cli::output::console::Console;
+use crate::cli::output::reporters::Reporter;
 use crate::cli::values::{MOST, whole};
-use crate::draw::error::write_whole;
-use crate::draw::report::Content;
+use crate::commands::report;
+use crate::commands::report::ReportOptions;
 use crate::store::folder;
 use clap::Args;
 use std::path::PathBuf;
@@ -60,33 +61,17 @@ pub(super) fn run(args: ReportArgs, console: &Console) -> Result<(), Error> {
     let out = args
         .out
         .unwrap_or_else(|| folder::beside_all(&archives, "report.html"));
-    folder::writable(&out)?;
-    let gathered = dossier::gather(
-        &archives,
-        args.data.as_deref(),
-        args.rollouts > 0,
-        &|text| console.warning(text),
-    )?;
-    let rollouts = args.rollouts.div_ceil(archives.len());
-    let content = Content {
-        gathered: &gathered,
-        rollouts,
+    let options = ReportOptions {
+        archives,
+        rollouts: args.rollouts,
+        out,
         spell: &spell,
     };
-    let page = {
-        let counter = console.counter(
-            "simulating for the page:",
-            content.count() as u64,
-            "rollouts",
-        );
-        content.page(&|simulated| counter.update(simulated))
-    };
-    let page = page?;
-    write_whole(&out, page.as_bytes())?;
-    let size = number::fixed(page.len() as f64 / 1e6, 1);
-    console.line_about(&out, &format!("wrote {} ({size} MB)", out.display()));
+    let reporter = Reporter::new(console);
+    report::report(&options, &Session::new(&NEVER, &reporter).data(args.data))?;
+    drop(reporter);
     match args.open {
-        true => super::show(&out),
+        true => super::show(&options.out),
         false => Ok(()),
     }
 }

@@ -151,7 +151,8 @@ pub(super) fn after_evolution(
     let name = name(&archive, groups, None);
     let of_training = out.with_file_name(&name);
     // Obstacles must be reported before the gaits evolve for an hour.
-    let whereabouts = Whereabouts::given(session.folder()).and_of_resumed(*if_exists, &archive);
+    let whereabouts =
+        Whereabouts::given(session.data_folder()).and_of_resumed(*if_exists, &archive);
     training::check(config, groups, &whereabouts)?;
     if *if_exists == IfExists::Refuse {
         folder::vacant(&of_training)?;

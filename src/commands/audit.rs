@@ -233,7 +233,7 @@ fn open(options: &AuditOptions, session: &Session) -> Result<Opened, Error> {
     source.has_task()?;
     let run = &source.run;
     check_out(&options.out, path, AUDIT_JSON)?;
-    let whereabouts = Whereabouts::given(session.folder()).and_of(path);
+    let whereabouts = Whereabouts::given(session.data_folder()).and_of(path);
     let training = training_of(run, path, &whereabouts)?;
     // A training may have had other conditions than the protocol, which the audit follows;
     // published robots come with their fitness only.

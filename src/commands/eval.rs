@@ -7,6 +7,7 @@ use crate::base::observer::Work;
 use crate::base::ranges::MOST;
 use crate::base::remedy::Remedy;
 use crate::base::session::Session;
+use crate::base::statistics::{bootstrap, standard_deviation};
 use crate::base::text::counted;
 use crate::commands::eval::images::{Draw, HeldOutImages};
 use crate::config::validation::LEAST;
@@ -21,7 +22,7 @@ use crate::search::held_out_run::Trial;
 use crate::search::held_out_run::{HeldOutRun, control_steps, task_of};
 use crate::search::validation;
 use crate::store::audit::{AuditFile, RobotAudit};
-use crate::store::eval::{EvalFile, RobotReport};
+use crate::store::eval::{EvalFile, Mean, RobotReport};
 use crate::store::folder::check_out;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{EVAL_JSON, EVAL_VALIDATION_JSON};
@@ -33,6 +34,7 @@ use crate::store::validation::Validated;
 use crate::task::grouping::Grouping;
 use crate::task::protocol::MAX_STEPS;
 use crate::task::stimulus::StimulusParams;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Options of an evaluation.
@@ -327,7 +329,7 @@ impl<'o> Opened<'o> {
                 "expected with test images only: validation images are of the runs' own data";
             return Err(Error::usage(text.to_string()).about("dataset"));
         }
-        let mut whereabouts = Whereabouts::given(session.folder());
+        let mut whereabouts = Whereabouts::given(session.data_folder());
         for archive in &options.archives {
             whereabouts = whereabouts.and_of(archive);
         }
@@ -464,7 +466,7 @@ impl Testing<'_> {
                     validation,
                     ..of_trial
                 });
-                report.conclude();
+                report.means = means(&report.robots);
             }
             if ranks.leads() && report.robots.len() > before {
                 let written =
@@ -550,6 +552,42 @@ fn skilled<'a>(
         ));
     }
     Ok(robots)
+}
+
+/// Averages robots by task.
+fn means(robots: &[RobotReport]) -> BTreeMap<String, Mean> {
+    let mut by_task = BTreeMap::<&str, Vec<&RobotReport>>::new();
+    robots
+        .iter()
+        .for_each(|robot| by_task.entry(&robot.task).or_default().push(robot));
+    let mean = |robots: &[&RobotReport], of: fn(&RobotReport) -> f64| {
+        robots.iter().map(|robot| of(robot)).sum::<f64>() / robots.len() as f64
+    };
+    let means = by_task.into_iter().map(|(task, robots)| {
+        let (accuracy, balanced_accuracy) = (
+            mean(&robots, |r| r.accuracy),
+            mean(&robots, |r| r.balanced_accuracy),
+        );
+        let accuracies: Vec<f64> = robots.iter().map(|robot| robot.accuracy).collect();
+        let mut by_run = BTreeMap::<usize, Vec<f64>>::new();
+        robots
+            .iter()
+            .for_each(|robot| by_run.entry(robot.run).or_default().push(robot.accuracy));
+        let by_run: Vec<Vec<f64>> = by_run.into_values().collect();
+        let (standard_deviation, interval) = (standard_deviation(&accuracies), bootstrap(&by_run));
+        let robots = robots.len();
+        (
+            task.to_string(),
+            Mean {
+                robots,
+                accuracy,
+                balanced_accuracy,
+                standard_deviation,
+                interval,
+            },
+        )
+    });
+    means.collect()
 }
 
 /// Returns the default file name of the results beside a run.json.

@@ -84,7 +84,7 @@ pub fn evolve(options: &EvolveOptions, session: &Session) -> Result<EvolveOutcom
             "goes on with it",
         )));
     }
-    let whereabouts = Whereabouts::given(session.folder())
+    let whereabouts = Whereabouts::given(session.data_folder())
         .and_of_resumed(options.if_exists, &options.out.join(RUN_JSON));
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;
     whereabouts::say_transposed(&dataset, &config.data, session);

@@ -12,6 +12,8 @@ pub mod plan;
 #[cfg(feature = "figures")]
 pub mod plot;
 pub mod replay;
+#[cfg(feature = "figures")]
+pub(crate) mod report;
 pub(crate) mod reproduce;
 pub(crate) mod response;
 pub mod schema;

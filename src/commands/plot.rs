@@ -101,10 +101,9 @@ pub struct PlotOptions {
     pub background: Background,
 }
 
-/// The files that were made.
+/// The result of `plot`, besides files.
 #[derive(Clone, Debug)]
 pub struct PlotOutcome {
-    pub(crate) files: Vec<PathBuf>,
     pub(crate) progress: Vec<Progress>,
 }
 
@@ -114,7 +113,7 @@ struct Made {
     stem: PathBuf,
 }
 
-/// Makes figures, reports their files and returns these.
+/// Makes figures, and reports each file to the observer when it is written.
 ///
 /// # Errors
 /// Returns an error if an input is invalid, or a figure cannot be made or written.
@@ -143,8 +142,8 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
             .iter()
             .try_for_each(|ending| folder::writable(&named(path, ending)))?;
     }
-    let (mut files, mut progress) = (Vec::new(), Vec::new());
-    let mut write = |made: Made| -> Result<(), Error> {
+    let mut progress = Vec::new();
+    let write = |made: Made| -> Result<(), Error> {
         let figure = made.figure.on(wanted.background);
         let made = |ending: &&str| -> Result<(PathBuf, Vec<u8>), Error> {
             let path = match &wanted.out {
@@ -160,7 +159,7 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
         // Makes all files before writing any.
         for (path, bytes) in endings.iter().map(made).collect::<Result<Vec<_>, _>>()? {
             write_whole(&path, &bytes)?;
-            files.push(path);
+            session.observer.wrote(&path, "");
         }
         Ok(())
     };
@@ -216,7 +215,7 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
         }
         all.into_iter().try_for_each(write)?;
     }
-    Ok(PlotOutcome { files, progress })
+    Ok(PlotOutcome { progress })
 }
 
 /// Encodes a figure as PNG; notes if its resolution is lower than usual.

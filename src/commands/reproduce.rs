@@ -93,7 +93,7 @@ pub(crate) fn reproduce(
     let plan = options.plan.at(options.scale);
     let experiments = plan.experiments()?;
     for (_, config) in &experiments {
-        let dataset = Whereabouts::given(session.folder()).load(&config.data, &Split::ALL)?;
+        let dataset = Whereabouts::given(session.data_folder()).load(&config.data, &Split::ALL)?;
         check_test(config, &dataset, HowMany::Evenly(plan.images), "images")?;
     }
     let runs = tasks::run_all(&tasks, place, options.jobs, session)?;

@@ -353,7 +353,7 @@ fn task(
         Some(seed),
         &options.set,
     )?;
-    let whereabouts = Whereabouts::given(session.folder()).and_of(&options.archive);
+    let whereabouts = Whereabouts::given(session.data_folder()).and_of(&options.archive);
     same_walks(&provenance.config, &config)?;
     let data = |config: &Config| {
         let DataConfig {

@@ -80,7 +80,7 @@ pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutco
             .map(|source| (source.path.as_path(), &source.run)),
     )?;
     let robots = chosen(options, &sources)?;
-    let mut whereabouts = Whereabouts::given(session.folder());
+    let mut whereabouts = Whereabouts::given(session.data_folder());
     for archive in &options.archives {
         whereabouts = whereabouts.and_of(archive);
     }

@@ -76,7 +76,7 @@ pub fn train(options: &TrainOptions, session: &Session) -> Result<TrainOutcome, 
         return Err(error.remedy(Remedy::ChooseRobots(Some("top:4"))));
     }
     let source = robots::open(&options.archive)?;
-    let whereabouts = Whereabouts::given(session.folder())
+    let whereabouts = Whereabouts::given(session.data_folder())
         .and_of_resumed(options.if_exists, &options.out.join(RUN_JSON))
         .and_of(&options.archive);
     let config = config_of(

@@ -15,7 +15,6 @@ use crate::store::images::{DatasetRef, ImageRef};
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
 use crate::store::run::{Robot, RunFile};
 use crate::task::answer::Direction;
-use crate::task::answer::Readout;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -52,23 +51,6 @@ pub struct Published {
     pub zero_walks: Direction,
     /// Its body.
     pub body: Body,
-}
-
-impl Published {
-    /// Returns the classes that its two directions stand for.
-    pub(crate) fn judge(&self) -> Readout {
-        let says = |way| {
-            if way == self.zero_walks {
-                vec![0]
-            } else {
-                vec![1]
-            }
-        };
-        Readout {
-            left: says(Direction::Left),
-            right: says(Direction::Right),
-        }
-    }
 }
 
 /// Returns all published robots.

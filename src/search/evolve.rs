@@ -115,7 +115,7 @@ impl<'a> Run<'a> {
         session.observer.generation(&self.progress());
         let every = Duration::try_from_secs_f64(config.checkpoint.seconds).unwrap_or(Duration::MAX);
         if let Some(files) = files.as_mut().filter(|_| self.generation == 0) {
-            // Whoever watches the folder sees at once what has begun.
+            // A watcher of the folder sees at once what has begun.
             files.save(self)?;
         }
         let [mut saved, mut flushed] = [Instant::now(); 2];

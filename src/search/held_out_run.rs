@@ -4,10 +4,10 @@ use crate::base::Grid;
 use crate::base::error::Error;
 use crate::base::observer::Work;
 use crate::base::session::Session;
-use crate::base::statistics::{bootstrap, standard_deviation, wilson};
+use crate::base::statistics::wilson;
 use crate::base::text::counted;
 use crate::config::Config;
-use crate::store::eval::{EvalFile, Mean, RobotReport};
+use crate::store::eval::RobotReport;
 use crate::store::images::ImageRef;
 use crate::store::run::{Robot, RunFile};
 use crate::task::answer::{Assignment, is_correct};
@@ -16,7 +16,7 @@ use crate::task::fitness::Group;
 use crate::task::grouping::ClassSplit;
 use crate::task::grouping::{self, Grouping};
 use crate::task::protocol::{Protocol, RolloutMode};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Actuation cycles per image in the paper's test.
@@ -178,44 +178,5 @@ impl RobotReport {
             validation: None,
             displacements,
         }
-    }
-}
-
-impl EvalFile {
-    /// Averages over the robots so far.
-    pub(crate) fn conclude(&mut self) {
-        let mut by_task = BTreeMap::<&str, Vec<&RobotReport>>::new();
-        self.robots
-            .iter()
-            .for_each(|robot| by_task.entry(&robot.task).or_default().push(robot));
-        let mean = |robots: &[&RobotReport], of: fn(&RobotReport) -> f64| {
-            robots.iter().map(|robot| of(robot)).sum::<f64>() / robots.len() as f64
-        };
-        let means = by_task.into_iter().map(|(task, robots)| {
-            let (accuracy, balanced_accuracy) = (
-                mean(&robots, |r| r.accuracy),
-                mean(&robots, |r| r.balanced_accuracy),
-            );
-            let accuracies: Vec<f64> = robots.iter().map(|robot| robot.accuracy).collect();
-            let mut by_run = BTreeMap::<usize, Vec<f64>>::new();
-            robots
-                .iter()
-                .for_each(|robot| by_run.entry(robot.run).or_default().push(robot.accuracy));
-            let by_run: Vec<Vec<f64>> = by_run.into_values().collect();
-            let (standard_deviation, interval) =
-                (standard_deviation(&accuracies), bootstrap(&by_run));
-            let robots = robots.len();
-            (
-                task.to_string(),
-                Mean {
-                    robots,
-                    accuracy,
-                    balanced_accuracy,
-                    standard_deviation,
-                    interval,
-                },
-            )
-        });
-        self.means = means.collect();
     }
 }

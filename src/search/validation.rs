@@ -81,7 +81,7 @@ pub(crate) fn validate(
     let source = robots::open(&options.archive)?;
     let config = &source.run.config;
     let count = options.best.unwrap_or(config.validation.best);
-    let whereabouts = Whereabouts::given(session.folder()).and_of(&source.path);
+    let whereabouts = Whereabouts::given(session.data_folder()).and_of(&source.path);
     let dataset = load_dataset_of(
         Some(&source.run.dataset),
         config,

@@ -405,37 +405,18 @@ fn fittest_first(robots: &mut [Entry]) {
 }
 
 fn published() -> Result<Collection, Error> {
-    let config = published::config()?;
-    let grouping = config.grouping()?;
-    let tasks: Vec<String> = grouping.tasks().iter().map(|split| split.name()).collect();
-    let entry = |robot: published::Published| Entry {
-        judge: Some(robot.judge()),
-        id: robot.name,
-        task: tasks
-            .first()
-            .expect("the published robots perform a task")
-            .clone(),
-        fitness: robot.fitness,
-        voxels: robot.body.counts(),
-        cell: Vec::new(),
-        generation: None,
-        encoding: config.stimulus,
-        audit: None,
-        body: robot.body,
-    };
-    let mut robots: Vec<Entry> = published::gallery()?.into_iter().map(entry).collect();
-    fittest_first(&mut robots);
-    let name = "Published with the paper".to_string();
+    let mut all = of_run(published::run()?, None)?;
+    // Nothing is known of how they came about.
+    for robot in &mut all.robots {
+        robot.cell.clear();
+        robot.generation = None;
+    }
     Ok(Collection {
-        name,
-        path: None,
-        config,
+        name: "Published with the paper".to_string(),
         dataset: None,
         generations: None,
         bins: Vec::new(),
-        tasks,
-        robots,
-        gone: Vec::new(),
+        ..all
     })
 }
 

@@ -121,7 +121,8 @@ pub(crate) fn runs(name: &str) -> Result<Vec<PathBuf>, String> {
 fn runs_of(sets: &[Set], name: &str) -> Result<Vec<PathBuf>, String> {
     if sets.is_empty() {
         return Err(format!(
-            "{name} is not in this build of morphcog: build it with the feature `gallery`, or name a run.json by its path"
+            "{name} is not in this build of morphcog: build it with the feature `gallery`, \
+             or name a run.json by its path"
         ));
     }
     let of_set = |(set, runs): &Set| {

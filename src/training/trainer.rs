@@ -245,7 +245,8 @@ fn report_window(session: &Session, robot: &str, found: &Found, tried: usize) {
     } = found;
     let [after, before] = [predicted, predicted_before].map(|fitness| number::fixed(*fitness, 2));
     session.observer.note(&format!(
-        "{robot}: of {tried} windows, stimulus.margin = {margins} is predicted to be best: fitness {after}, before {before}"
+        "{robot}: of {tried} windows, stimulus.margin = {margins} is predicted to be best: \
+         fitness {after}, before {before}"
     ));
     session.observer.finding(
         "window",

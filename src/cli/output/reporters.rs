@@ -4,6 +4,7 @@ use crate::base::error::Error;
 use crate::base::observer::{Generation, Observer, Work};
 use crate::cli::explain::{Explained, explain};
 use crate::cli::output::console::{Bar, Console, Counter};
+use std::path::Path;
 use std::sync::{PoisonError, RwLock};
 
 /// Displays the progress of a command on a console.
@@ -40,6 +41,13 @@ impl<'c> Reporter<'c> {
 impl Observer for Reporter<'_> {
     fn note(&self, text: &str) {
         self.console.info(text);
+    }
+
+    fn wrote(&self, path: &Path, about: &str) {
+        // Ends the line of the work that made it.
+        self.show(|| Line::None);
+        let text = format!("wrote {}{about}", path.display());
+        self.console.line_about(path, &text);
     }
 
     fn begins(&self, work: &Work) {

@@ -113,7 +113,7 @@ fn whereabouts(eval: &Path, session: &Session) -> Whereabouts {
         .flatten();
     let mut runs: Vec<PathBuf> = entries.map(|entry| entry.path().join(RUN_JSON)).collect();
     runs.sort();
-    let here = Whereabouts::given(session.folder()).and_of(eval);
+    let here = Whereabouts::given(session.data_folder()).and_of(eval);
     runs.iter()
         .fold(here, |whereabouts, run| whereabouts.and_of(run))
 }

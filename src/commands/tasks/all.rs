@@ -124,7 +124,7 @@ pub(crate) fn run_all(
     };
     let numbered: Vec<(usize, &Task)> =
         (1..).zip(tasks).filter(|(_, task)| is_open(task)).collect();
-    check_data(numbered.iter().copied(), place, session.folder())?;
+    check_data(numbered.iter().copied(), place, session.data_folder())?;
     std::fs::create_dir_all(&place.out).map_err(|error| Error::writing(&place.out, &error))?;
     let before = tasks.len() - numbered.len();
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
