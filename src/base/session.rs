@@ -65,6 +65,7 @@ impl<'a> Session<'a> {
         Session { data, ..self }
     }
 
+    /// Returns a session like this one with another observer, and threads of its own.
     pub(crate) fn watched<'b>(&self, observer: &'b dyn Observer) -> Session<'b>
     where
         'a: 'b,

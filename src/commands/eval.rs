@@ -63,8 +63,9 @@ pub struct EvalOptions {
 }
 
 impl EvalOptions {
-    fn draw(&self) -> Draw {
-        let choosing = self.robots.validated().map(|_| self.validation);
+    fn draw(&self, config: &Config) -> Draw {
+        let images = self.validation.unwrap_or(config.validation.images);
+        let choosing = self.robots.validated().map(|_| images);
         Draw {
             images: self.images,
             split: self.split,
@@ -111,7 +112,7 @@ pub fn eval(options: &EvalOptions, session: &Session) -> Result<EvalOutcome, Err
         .iter()
         .for_each(|text| session.observer.warning(text));
     let robots = skilled(options.robots.of(sources, options.seed)?, grouping, session)?;
-    let shown = HeldOutImages::draw(config, sources, dataset, options.draw())?;
+    let shown = HeldOutImages::draw(config, sources, dataset, options.draw(config))?;
     let mut report = opened.report(options, &shown);
     let tasks = robots
         .iter()
@@ -182,7 +183,7 @@ pub(crate) fn known(options: &EvalOptions, session: &Session) -> Result<Option<E
         &opened.config,
         &opened.sources,
         &opened.dataset,
-        options.draw(),
+        options.draw(&opened.config),
     )?;
     let is_it = !known.stopped
         && known.head() == opened.report(options, &shown)

@@ -19,6 +19,7 @@ pub(crate) trait Objective: Sync {
         seed: u64,
     ) -> (Vec<Grid<f64>>, Vec<Condition>);
 
+    /// Returns the body that is simulated for a candidate's.
     fn simulated<'b>(&self, body: &'b Body) -> Cow<'b, Body>;
 
     /// Returns the key by which a candidate's body counts as evaluated.
@@ -26,8 +27,10 @@ pub(crate) trait Objective: Sync {
         key(&self.simulated(body))
     }
 
+    /// Returns true if a known body may be evaluated again, where `savings` does not forbid it.
     fn may_repeat(&self) -> bool;
 
+    /// Returns the factor by which a body's fitness is multiplied.
     fn factor(&self, body: &Body) -> f64;
 
     /// Returns the order of the images, given the parent's answers; empty for their own order.

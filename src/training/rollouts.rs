@@ -4,6 +4,7 @@ use crate::base::Grid;
 use crate::body::Body;
 use crate::response::design_problem::Example;
 
+/// A training image as a gait sees it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Image {
     pub(crate) stimulus: Grid<f64>,
@@ -14,6 +15,7 @@ pub(crate) struct Image {
     pub(crate) condition: usize,
 }
 
+/// Simulates designs; tests plant a body whose response they know.
 pub(crate) trait Rollouts {
     type Error;
     /// Returns a body's displacements under stimuli and conditions \[voxel lengths\]; `None`:

@@ -26,9 +26,8 @@ pub(crate) struct Draw {
     pub(crate) images: HowMany,
     pub(crate) split: HeldOut,
     pub(crate) seed: u64,
-    /// Images by which robots are chosen at the same time, if they are; `None` in it: as many as
-    /// the config says.
-    pub(crate) choosing: Option<Option<usize>>,
+    /// Number of validation images by which robots are chosen at the same time, if they are.
+    pub(crate) choosing: Option<usize>,
 }
 
 /// Test or validation images, as robots see them.
@@ -62,7 +61,7 @@ impl<'a> HeldOutImages<'a> {
                 let runs: Vec<_> = sources.iter().map(|source| &source.run).collect();
                 // Images that choose robots now, or did before, as `validation.json` says.
                 let count = |source: &StoredRun| match draw.choosing {
-                    Some(images) => Ok(Some(images.unwrap_or(config.validation.images))),
+                    Some(images) => Ok(Some(images)),
                     None => shown_for_validation(source),
                 };
                 let besides = chosen_by(sources, dataset, count)?;
