@@ -6,6 +6,7 @@ use crate::base::random::{Purpose, stream};
 pub use crate::data::builtin::BUILTIN;
 use crate::data::builtin::{BuiltinDigits, BuiltinError};
 use crate::data::catalogue::{FETCHABLE, known_as};
+use crate::data::description::Description;
 use crate::data::files;
 use crate::data::files::{DatasetPlace, FilesError, StoredSplit};
 pub use crate::data::info::Split;
@@ -22,6 +23,9 @@ pub enum DatasetError {
     /// Such built-in digits do not exist.
     #[error(transparent)]
     Builtin(#[from] BuiltinError),
+    /// The folder's description is wrong.
+    #[error("{}", .0.message)]
+    Description(Error),
     /// A published dataset is in the place of another one.
     #[error("{place}: these {split} images are those of {found}, not of {dataset}")]
     Other {
@@ -92,6 +96,7 @@ pub struct Dataset {
     /// The folder with its files; none for the built-in digits.
     folder: Option<PathBuf>,
     origin: String,
+    class_names: Vec<String>,
     splits: BTreeMap<Split, Loaded>,
 }
 
@@ -136,6 +141,9 @@ impl Dataset {
             return Dataset::builtin(BuiltinDigits::default(), wanted);
         }
         let place = files::choose(name, given)?;
+        let described = Description::read(&place.path).map_err(DatasetError::Description)?;
+        let transpose = transpose.or(described.as_ref().and_then(|said| said.transpose));
+        let class_names = described.map_or_else(Vec::new, |said| said.class_names);
         let mut splits = BTreeMap::new();
         for &split in wanted {
             let (labels, stored) = files::load(name, &place, split, transpose)?;
@@ -158,6 +166,7 @@ impl Dataset {
             name: name.to_string(),
             folder: Some(place.path),
             origin: place.origin,
+            class_names,
             splits,
         })
     }
@@ -177,6 +186,7 @@ impl Dataset {
             name: BUILTIN.to_string(),
             folder: None,
             origin: BUILTIN.to_string(),
+            class_names: Vec::new(),
             splits,
         })
     }
@@ -188,6 +198,11 @@ impl Dataset {
     /// Returns the folder it was read from; none for the built-in digits.
     pub(crate) fn folder(&self) -> Option<&Path> {
         self.folder.as_deref()
+    }
+
+    /// Returns the names of its classes, from class 0; empty if they have numbers only.
+    pub(crate) fn class_names(&self) -> &[String] {
+        &self.class_names
     }
 
     /// Returns name, folder and the origin of that folder, for messages.

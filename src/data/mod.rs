@@ -3,6 +3,7 @@
 pub(crate) mod builtin;
 pub mod catalogue;
 pub mod dataset;
+pub(crate) mod description;
 pub mod fetch;
 pub mod files;
 pub(crate) mod idx;
