@@ -80,6 +80,7 @@ pub(super) fn run(args: ReproduceArgs, console: &Console) -> Result<(), Error> {
             tasks: &tasks,
             place: &place,
             with: &args.place,
+            number: "--task",
         },
         console,
     )? {

@@ -16,7 +16,6 @@ use crate::search::one_by_one;
 use crate::search::one_by_one::Named;
 use crate::store::folder;
 use crate::store::names::RESPONSE_JSON;
-use crate::task::grouping::Groups;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -53,7 +52,7 @@ pub(super) struct ResponseArgs {
     /// Two groups of classes, such as 4|9, 0|123 or 10,11|3 (as in train), to estimate the accuracy
     /// that training could reach.
     #[arg(short, long, value_name = "A|B")]
-    task: Option<Groups>,
+    task: Option<String>,
     /// Change a key of the config for a training of the task, such as stimulus.margin=5 or
     /// train.windows=2000; may be given several times.
     #[arg(long, value_name = "KEY=VALUE", requires = "task")]

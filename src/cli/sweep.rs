@@ -72,7 +72,7 @@ pub(super) struct SweepArgs {
 pub(super) fn run(args: SweepArgs, console: &Console) -> Result<(), Error> {
     let plan = SweepPlan::load(&args.plan, &args.set)?;
     let tasks = plan
-        .tasks(&args.plan)
+        .tasks(&args.plan, args.place.data.as_deref())
         .map_err(|errors| refused(errors, console))?;
     let name = args.plan.file_stem().map_or("sweep".to_string(), |stem| {
         stem.to_string_lossy().into_owned()
@@ -98,6 +98,7 @@ pub(super) fn run(args: SweepArgs, console: &Console) -> Result<(), Error> {
             tasks: &tasks,
             place: &place,
             with: &args.place,
+            number: "--task",
         },
         console,
     )? {

@@ -72,6 +72,8 @@ pub(super) struct Command<'a> {
     pub(super) tasks: &'a [Task],
     pub(super) place: &'a TaskFolders,
     pub(super) with: &'a TaskResources,
+    /// The option that numbers a task.
+    pub(super) number: &'static str,
 }
 
 impl Command<'_> {
@@ -122,7 +124,10 @@ impl Command<'_> {
     fn list(&self, count: usize, console: &Console) -> Result<(), Error> {
         let (line, threads) = (self.line()?, self.with.threads.unwrap_or(1));
         (1..=count).for_each(|number| {
-            console.command(&format!("{line} --threads {threads} --task {number}"))
+            console.command(&format!(
+                "{line} --threads {threads} {} {number}",
+                self.number
+            ))
         });
         Ok(())
     }
@@ -171,7 +176,7 @@ task= again=no had=
 trap 'again=yes had=${{had:-$SECONDS}}; [ -z "$task" ] || kill -USR1 "$task"' USR1
 trap '[ -z "$task" ] || kill -TERM "$task"' TERM
 number=$((${{TASKS_BEFORE:-0}} + SLURM_ARRAY_TASK_ID))
-{line} --threads "${{SLURM_CPUS_PER_TASK:-1}}" --task "$number" &
+{line} --threads "${{SLURM_CPUS_PER_TASK:-1}}" {option} "$number" &
 task=$!
 if [ "$again" = yes ]; then kill -USR1 "$task"; fi
 while true; do
@@ -189,7 +194,8 @@ if [ "$again" = yes ] && {{ [ "$code" -eq 75 ] || [ "$code" -eq 138 ]; }}; then
 fi
 exit "$code"
 "#,
-            log = in_shell(&log)
+            log = in_shell(&log),
+            option = self.number,
         ));
         Ok(())
     }
@@ -207,8 +213,10 @@ pub(super) fn refused(mut errors: Vec<Error>, console: &Console) -> Error {
 /// Warns of gaits that another version of the program made.
 pub(super) fn warn_of_gaits(tasks: &[Task], console: &Console) {
     // All tasks train the gaits of one archive.
-    if let Some(Run::Train(training)) = tasks.first().map(|task| &task.run) {
-        choice::warn_of_versions([&training.archive], console);
+    match tasks.first().map(|task| &task.run) {
+        Some(Run::Train(training)) => choice::warn_of_versions([&training.archive], console),
+        Some(Run::Pair(pair)) => choice::warn_of_versions(&pair.archives, console),
+        _ => {}
     }
 }
 
@@ -221,10 +229,11 @@ pub(super) fn handle_request(
 ) -> Result<bool, Error> {
     let place = command.place;
     if let Some(number) = what.task {
-        let number = number.map_or_else(from_engine, Ok)?;
+        let number = number.map_or_else(|| from_engine(command.number), Ok)?;
         let Some(task) = number.checked_sub(1).and_then(|index| tasks.get(index)) else {
             let text = format!(
-                "--task {number}: expected a number from 1 to {}",
+                "{} {number}: expected a number from 1 to {}",
+                command.number,
                 tasks.len()
             );
             return Err(Error::usage(text));
@@ -255,13 +264,13 @@ pub(super) fn handle_request(
 }
 
 /// Returns the number that an engine gave to this process.
-fn from_engine() -> Result<usize, Error> {
+fn from_engine(option: &str) -> Result<usize, Error> {
     let given = NUMBERS
         .iter()
         .find_map(|name| Some((name, std::env::var(name).ok()?)));
     let Some((name, value)) = given else {
         let text = format!(
-            "--task: expected a number, or one of {} to be set",
+            "{option}: expected a number, or one of {} to be set",
             NUMBERS.join(", ")
         );
         return Err(Error::usage(text));

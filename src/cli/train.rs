@@ -3,25 +3,34 @@
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
 use crate::base::session::Session;
-use crate::base::shell::in_shell;
+use crate::base::shell::{in_shell, quoted};
 use crate::cli::choice;
-use crate::cli::choice::{ROBOTS, run_json, selected};
+use crate::cli::choice::{Archives, ROBOTS, selected};
 use crate::cli::output::console::Console;
 use crate::cli::output::{summary, verdicts};
-use crate::cli::values::{seed, threads};
+use crate::cli::tasks::{
+    Command, TaskRequest, TaskResources, ended, handle_request, refused, warn_of_gaits,
+};
+use crate::cli::values::{MOST, seed, threads, whole};
 use crate::cli::{Resources, in_session};
 use crate::commands::audit;
 use crate::commands::evolve;
+use crate::commands::pairs;
+use crate::commands::pairs::PairsOptions;
+use crate::commands::tasks;
+use crate::commands::tasks::{Run, TaskFolders};
 use crate::commands::train;
 use crate::commands::train::{TrainOptions, TrainOutcome};
 use crate::config::audit::Criteria;
 use crate::images::whereabouts::Whereabouts;
+use crate::robots;
 use crate::robots::selection::Selection;
 use crate::shipped;
+use crate::shipped::gallery;
 use crate::store::folder;
 use crate::store::folder::IfExists;
 use crate::store::names::{AUDIT_JSON, RUN_JSON};
-use crate::task::grouping::{Groups, groups_text};
+use crate::task::grouping::Groups;
 use crate::training;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -35,24 +44,44 @@ Examples:
   # look for the part of the images that helps most
   morphcog train --task \"4|9\" --set train.windows=2000 \\
     --set stimulus.reduction=area
+  # a body for each pair of classes, which answer together
+  morphcog train --pairs --dataset shapes
+  morphcog train --pairs --classes 0,1,2,3 --status
+  morphcog train --pairs --list | parallel
 then
   morphcog eval --archive runs/gaits-seed1-4v9 --robots best
+  morphcog team --archive runs/shapes-team
 
 The response of each gait is measured with random images. The most promising gait is trained \
 on many training images, and the body is refined: challengers that answer better replace \
 it. The robot is validated on images that it was not trained on, and audited. Ctrl-C stops it; \
---resume goes on, also after its end with more challengers (--set train.challengers=240).";
+--resume goes on, also after its end with more challengers (--set train.challengers=240).
+
+--pairs trains each pair of classes with the gait whose response predicts the highest accuracy, and, \
+if that body is not physical, with the next best, too. Its settings are those of the team that ships \
+(morphcog help train lists them); --set changes them. The same command goes on after Ctrl-C, here or \
+elsewhere. Exit code 0: all pairs are done; 1: some failed; 75: stopped.";
+
+/// Help for `--archive`, whose default depends on `--pairs`.
+const ARCHIVE: &str = "The run.json of the gaits, or its folder (default: the newest under runs/; with --pairs \
+gallery:gaits, and several may follow)";
 
 #[derive(Debug, Args)]
+#[command(mut_arg("archive", |archive| archive.help(ARCHIVE)))]
 pub(super) struct TrainArgs {
-    /// The run.json of the gaits, or its folder (default: the newest under runs/).
-    #[arg(short, long, value_name = "FILE", value_parser = run_json())]
-    archive: Option<PathBuf>,
-    /// Two groups of classes, such as 4|9 or 0|123. Commas separate classes if one is above 9:
-    /// 10,11|3, or "1|26," for 1 against 26.
-    #[arg(short, long, value_name = "A|B")]
-    task: Groups,
-    #[arg(short, long, visible_aliases = ["robot", "select"], default_value = "top:4", help = ROBOTS)]
+    #[command(flatten)]
+    archives: Archives,
+    /// Two groups of classes, such as 4|9, 0|123 or cat|dog. Commas separate names, and numbers if
+    /// one is above 9: cat,wolf|dog, 10,11|3, or "1|26," for 1 against 26.
+    #[arg(short, long, value_name = "A|B", required_unless_present = "pairs")]
+    task: Option<String>,
+    /// Train a robot for each pair of classes.
+    #[arg(long, conflicts_with_all = ["task", "resume", "force"])]
+    pairs: bool,
+    /// Classes of the pairs, by name or number, such as 0,1,2 (default: all of the dataset).
+    #[arg(long, value_delimiter = ',', requires = "pairs")]
+    classes: Vec<String>,
+    #[arg(short, long, visible_aliases = ["robot", "select"], help = format!("{ROBOTS} [default: top:4, of each archive top:5 with --pairs]"))]
     robots: Vec<Selection>,
     /// Random seed (default: that of the archive's run).
     #[arg(long, value_parser = seed())]
@@ -61,10 +90,14 @@ pub(super) struct TrainArgs {
     /// times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// The dataset (default: that of the gaits).
+    #[arg(long, value_name = "NAME")]
+    dataset: Option<String>,
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Run folder (default: the archive's folder and the task, such as runs/gaits-seed1-4v9).
+    /// Run folder (default: the archive's folder and the task, such as runs/gaits-seed1-4v9; with
+    /// --pairs, of all pairs: runs/<dataset>-team).
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Go on with the training in the folder; start it if there is none.
@@ -76,12 +109,65 @@ pub(super) struct TrainArgs {
     /// Threads (default: one per core); the result does not depend on it.
     #[arg(long, value_parser = threads())]
     threads: Option<u16>,
+    #[command(flatten)]
+    what: PairRequest,
+}
+
+/// A request about pairs other than to train all of them here.
+#[derive(Debug, Args)]
+struct PairRequest {
+    /// Train one pair, or go on with it: its number from 1 (default: that of HQ_TASK_ID,
+    /// SLURM_ARRAY_TASK_ID or PBS_ARRAY_INDEX).
+    #[arg(long, value_name = "N", num_args = 0..=1, value_parser = whole::<usize>(0..=MOST), requires = "pairs", conflicts_with_all = ["list", "slurm", "status"])]
+    pair: Option<Option<usize>>,
+    /// Print one command per pair, for GNU parallel, HyperQueue or xargs.
+    #[arg(long, requires = "pairs", conflicts_with_all = ["slurm", "status"])]
+    list: bool,
+    /// Print a job script for Slurm's sbatch.
+    #[arg(long, requires = "pairs", conflicts_with = "status")]
+    slurm: bool,
+    /// Show the progress of every pair.
+    #[arg(long, requires = "pairs")]
+    status: bool,
+    /// Pairs at once (default: one per thread).
+    #[arg(long, value_parser = threads(), requires = "pairs")]
+    jobs: Option<u16>,
 }
 
 pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
-    let archive = args.archive.map_or_else(folder::newest_run, Ok)?;
+    if args.pairs {
+        return pairs(args, console);
+    }
+    let archive = match args.archives.paths().as_slice() {
+        [] => folder::newest_run()?,
+        [archive] => archive.clone(),
+        several => {
+            let text = format!("expected the gaits of one run, these are {}", several.len());
+            let first = folder::name(&several[0]);
+            let error = Error::usage(text).about("archive");
+            return Err(error.advice(format!("name one, such as {first}")));
+        }
+    };
     let robots = selected(args.robots)?.unwrap_or(Selection::Top(GAITS));
-    let name = name(&archive, args.task.classes(), args.seed);
+    let dataset = args
+        .dataset
+        .iter()
+        .map(|name| format!("data.dataset={name}"));
+    let set: Vec<String> = dataset.chain(args.set).collect();
+    let whereabouts = Whereabouts::given(args.data.as_deref()).and_of(&archive);
+    let of_gaits = robots::open(&archive)?;
+    let text = args
+        .task
+        .as_deref()
+        .expect("clap requires it without pairs");
+    let groups =
+        training::groups_of(text, &of_gaits.run.config, &set, &whereabouts).map_err(|error| {
+            match error.argument {
+                None => error.about("task"),
+                Some(_) => error,
+            }
+        })?;
+    let name = name(&archive, &groups, args.seed);
     let beside = match shipped::is_named(&archive) {
         true => Some(Path::new(folder::RUNS)),
         false => archive.parent().and_then(|folder| folder.parent()),
@@ -98,9 +184,9 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
     let options = TrainOptions {
         archive,
         robots,
-        groups: args.task,
+        groups,
         seed: args.seed,
-        set: args.set,
+        set,
         name,
         out,
         if_exists,
@@ -112,7 +198,7 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
 const GAITS: usize = 4;
 
 /// Returns the name of a training: the archive's folder and the task.
-fn name(archive: &Path, [a, b]: &[Vec<u8>; 2], seed: Option<u64>) -> String {
+fn name(archive: &Path, groups: &Groups, seed: Option<u64>) -> String {
     let folder = archive
         .parent()
         .and_then(Path::file_name)
@@ -123,7 +209,102 @@ fn name(archive: &Path, [a, b]: &[Vec<u8>; 2], seed: Option<u64>) -> String {
         None => folder.as_deref().unwrap_or("run"),
     };
     let seed = seed.map_or(String::new(), |seed| format!("-seed{seed}"));
-    format!("{of}-{}{seed}", groups_text([a, b], "v"))
+    format!("{of}-{}{seed}", groups.in_files())
+}
+
+/// Gaits of each archive that a pair tries.
+const GAITS_OF_EACH: usize = 5;
+
+/// Trains the pairs of a team, or handles a request about them.
+fn pairs(args: TrainArgs, console: &Console) -> Result<(), Error> {
+    let mut archives = args.archives.paths();
+    if archives.is_empty() {
+        archives = folder::run_json(PathBuf::from(gallery::GAITS)).map_err(Error::other)?;
+    }
+    let options = PairsOptions {
+        archives,
+        robots: selected(args.robots)?.unwrap_or(Selection::Top(GAITS_OF_EACH)),
+        dataset: args.dataset.clone(),
+        classes: (!args.classes.is_empty()).then_some(args.classes.clone()),
+        seed: args.seed,
+        set: args.set.clone(),
+    };
+    let name = format!("{}-team", options.dataset_name()?);
+    let out = args
+        .out
+        .unwrap_or_else(|| Path::new(folder::RUNS).join(&name));
+    let tasks = options.tasks(args.data.as_deref())?;
+    let place = TaskFolders { out: out.clone() };
+    let PairRequest {
+        pair,
+        list,
+        slurm,
+        status,
+        jobs,
+    } = args.what;
+    let with = TaskResources {
+        data: args.data,
+        jobs,
+        threads: args.threads,
+    };
+    let what = TaskRequest {
+        task: pair,
+        list,
+        slurm,
+        status,
+    };
+    let command = Command {
+        words: words(&options, &args.classes)?,
+        name: &name,
+        tasks: &tasks,
+        place: &place,
+        with: &with,
+        number: "--pair",
+    };
+    if handle_request(&what, &tasks, &command, console)? {
+        return Ok(());
+    }
+    tasks::check_folders(&tasks, &place).map_err(|errors| refused(errors, console))?;
+    warn_of_gaits(&tasks, console);
+    let summary = in_session(console, with.with(), |session| {
+        if let Some(Run::Pair(pair)) = tasks.first().map(|task| &task.run) {
+            pairs::measure(pair, session)?;
+        }
+        tasks::run_all(&tasks, &place, jobs.map(usize::from), session)
+    })?;
+    ended(&summary, tasks.len())?;
+    summary::pairs(console, &tasks, &place)?;
+    console.suggest(
+        "next:",
+        &format!("morphcog team --archive {}", in_shell(&out)),
+    );
+    Ok(())
+}
+
+/// Returns the words of the command that trains the same pairs anywhere.
+fn words(options: &PairsOptions, classes: &[String]) -> Result<Vec<String>, Error> {
+    let mut words = vec!["train".to_string(), "--pairs".to_string()];
+    for archive in &options.archives {
+        let named = match folder::full_name(archive) {
+            Some(name) => quoted(&name),
+            None => {
+                let absolute = std::path::absolute(archive);
+                in_shell(&absolute.map_err(|error| Error::reading(archive, &error))?)
+            }
+        };
+        words.extend(["--archive".to_string(), named]);
+    }
+    words.extend(["--robots".to_string(), quoted(&options.robots.to_string())]);
+    let dataset = options.dataset.iter();
+    words.extend(dataset.flat_map(|name| ["--dataset".to_string(), quoted(name)]));
+    if !classes.is_empty() {
+        words.extend(["--classes".to_string(), quoted(&classes.join(","))]);
+    }
+    let seed = options.seed.iter();
+    words.extend(seed.flat_map(|seed| ["--seed".to_string(), seed.to_string()]));
+    let set = options.set.iter();
+    words.extend(set.flat_map(|set| ["--set".to_string(), quoted(set)]));
+    Ok(words)
 }
 
 /// Returns the training that `evolve --train` does after the gaits have evolved. It fails if the
@@ -148,12 +329,14 @@ pub(super) fn after_evolution(
         return Err(Error::usage(text).advice("evolve first, then morphcog train --task"));
     };
     let archive = out.join(RUN_JSON);
+    let whereabouts =
+        Whereabouts::given(session.data_folder()).and_of_resumed(*if_exists, &archive);
+    let names = whereabouts.class_names(&config.data)?;
+    let groups = &Groups::from(groups.clone()).named(&names);
     let name = name(&archive, groups, None);
     let of_training = out.with_file_name(&name);
     // Obstacles must be reported before the gaits evolve for an hour.
-    let whereabouts =
-        Whereabouts::given(session.data_folder()).and_of_resumed(*if_exists, &archive);
-    training::check(config, groups, &whereabouts)?;
+    training::check(config, groups.classes(), &whereabouts)?;
     if *if_exists == IfExists::Refuse {
         folder::vacant(&of_training)?;
     }
@@ -161,7 +344,7 @@ pub(super) fn after_evolution(
         out: of_training,
         archive,
         robots: Selection::Top(GAITS),
-        groups: groups.clone().into(),
+        groups: groups.clone(),
         seed: None,
         set: Vec::new(),
         name,

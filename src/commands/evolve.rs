@@ -71,7 +71,6 @@ impl EvolveOutcome {
 /// # Errors
 /// Returns an error if config, data or folder is unsuitable. No existing results are lost.
 pub fn evolve(options: &EvolveOptions, session: &Session) -> Result<EvolveOutcome, Error> {
-    let config = &options.config;
     let resumes = options.if_exists == IfExists::Resume;
     // Check everything that can be known before anything is written.
     if resumes && options.out.join(TRAINING_JSON).exists() {
@@ -86,8 +85,9 @@ pub fn evolve(options: &EvolveOptions, session: &Session) -> Result<EvolveOutcom
     }
     let whereabouts = Whereabouts::given(session.data_folder())
         .and_of_resumed(options.if_exists, &options.out.join(RUN_JSON));
-    let dataset = whereabouts.load(&config.data, &[Split::Train])?;
-    whereabouts::say_transposed(&dataset, &config.data, session);
+    let dataset = whereabouts.load(&options.config.data, &[Split::Train])?;
+    whereabouts::say_transposed(&dataset, &options.config.data, session);
+    let config = &options.config.clone().with_names_of(&dataset);
     let size = dataset
         .size(Split::Train)
         .expect("its training images were loaded just now");

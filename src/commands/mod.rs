@@ -8,6 +8,7 @@ pub(crate) mod collect;
 pub(crate) mod data;
 pub mod eval;
 pub mod evolve;
+pub(crate) mod pairs;
 pub mod plan;
 #[cfg(feature = "figures")]
 pub mod plot;

@@ -1,7 +1,6 @@
 //! `morphcog response`: measures how far each soft voxel and sensor moves a robot, and estimates
 //! the accuracy that training could reach.
 
-use crate::base::Grid;
 use crate::base::error::{Error, ErrorKind};
 use crate::base::observer::Work;
 use crate::base::remedy::Remedy;
@@ -10,46 +9,33 @@ use crate::base::text::counted;
 use crate::body::Body;
 use crate::config::train::MOST_RANDOM_IMAGES;
 use crate::config::{Config, DataConfig, MAX_NUMBER};
-use crate::data::dataset::{Dataset, DatasetError, Split};
-use crate::images::training::scarcest;
-use crate::images::whereabouts::{Whereabouts, load_dataset_of, say_transposed, stimulus_for};
-use crate::response::design_problem::Example;
-use crate::response::estimate::teachable;
+use crate::data::dataset::{Dataset, Split};
+use crate::images::whereabouts::{Whereabouts, load_dataset_of, say_transposed};
 use crate::response::gait::Gait;
 use crate::response::probing;
 use crate::response::probing::Probing;
-use crate::response::regression::{RandomRollout, Response};
+use crate::response::regression::RandomRollout;
 use crate::robots;
 use crate::robots::selection::Selection;
 use crate::store::folder::{check_out, writable};
-use crate::store::images::{DatasetRef, ImageRef};
+use crate::store::images::DatasetRef;
 use crate::store::names::RESPONSE_JSON;
 use crate::store::response::{
     EndedBy, FORMAT, FORMAT_VERSION, PICTURES, ResponseFile, ResponseSetting, RobotResponse,
-    TrainingEstimate, Unfinished, pictures,
+    Unfinished, pictures,
 };
 use crate::store::results::replaced;
 use crate::store::unwritten::Unwritten;
-use crate::task::answer;
 use crate::task::evaluation::fresh_rollouts_so_far;
-use crate::task::grouping::{Groups, balanced};
 use crate::task::perturbation::Condition;
 use crate::task::protocol::{Protocol, RolloutMode};
-use crate::task::stimulus::StimulusParams;
 use crate::training;
-use crate::training::window::Windows;
+use crate::training::prediction::Predictor;
 use std::path::PathBuf;
 
 /// Rollouts between two checks of the slopes' error, and fewest of a robot: ten under each of six
 /// conditions. Larger batches overshoot; smaller ones leave cores idle at their ends.
 pub(crate) const BATCH: usize = 60;
-
-/// Most training images per class of a task. More cost time, and hardly narrow the interval of the
-/// estimated accuracy.
-const IMAGES_PER_CLASS: usize = 1000;
-
-/// Fewest images per class of a task: half pose the design problems, half test the answers.
-const LEAST_PER_CLASS: usize = 4;
 
 #[derive(Clone, Debug)]
 pub(crate) struct ResponseOptions {
@@ -58,7 +44,7 @@ pub(crate) struct ResponseOptions {
     /// True if only robots count that an audit found physical.
     pub(crate) physical_only: bool,
     /// Two groups of classes, to estimate the accuracy that training could reach.
-    pub(crate) task: Option<Groups>,
+    pub(crate) task: Option<String>,
     /// Config keys that a training would change, as `stimulus.margin=5`; only with a task.
     pub(crate) set: Vec<String>,
     /// Most rollouts per robot.
@@ -329,31 +315,24 @@ fn conditions(config: &Config, rollouts: usize) -> Vec<Condition> {
         .collect()
 }
 
-/// A task that robots could be trained for.
-struct Task {
-    groups: Groups,
-    config: Config,
-    dataset: Dataset,
-    /// Training images, equally many per class, class by class.
-    images: Vec<ImageRef>,
-}
-
 fn task(
     options: &ResponseOptions,
     provenance: &Provenance,
     seed: u64,
     session: &Session,
-) -> Result<Option<Task>, Error> {
-    let Some(groups) = &options.task else {
+) -> Result<Option<Predictor>, Error> {
+    let Some(text) = &options.task else {
         return Ok(None);
     };
+    let whereabouts = Whereabouts::given(session.data_folder()).and_of(&options.archive);
+    let groups = training::groups_of(text, &provenance.config, &options.set, &whereabouts)
+        .map_err(|error| error.about("task"))?;
     let config = training::config_of(
         &provenance.config,
         groups.classes(),
         Some(seed),
         &options.set,
     )?;
-    let whereabouts = Whereabouts::given(session.data_folder()).and_of(&options.archive);
     same_walks(&provenance.config, &config)?;
     let data = |config: &Config| {
         let DataConfig {
@@ -367,7 +346,7 @@ fn task(
     };
     let of_run = Some(&provenance.dataset).filter(|_| data(&config) == data(&provenance.config));
     let dataset = load_dataset_of(of_run, &config, &whereabouts, &[Split::Train])?;
-    training::check_groups(groups, &dataset)?;
+    training::check_groups(&groups, &dataset)?;
     say_transposed(&dataset, &config.data, session);
     let config = training::with_fitting_margin(
         config,
@@ -377,30 +356,7 @@ fn task(
         &options.set,
         session,
     );
-    let classes = groups.classes().concat();
-    let per_class = IMAGES_PER_CLASS.min(scarcest(&dataset, &classes, LEAST_PER_CLASS)?);
-    let failed = |error: DatasetError| Error::input(error.to_string());
-    let drawn = dataset
-        .draw(Split::Train, &classes, per_class, seed)
-        .map_err(failed)?;
-    let labels = classes
-        .iter()
-        .flat_map(|class| std::iter::repeat_n(*class, per_class));
-    let images = labels
-        .zip(drawn)
-        .map(|(label, index)| ImageRef { index, label })
-        .collect();
-    let task = Task {
-        groups: groups.clone(),
-        config,
-        dataset,
-        images,
-    };
-    // Images that cannot be seen must be refused before anything is measured.
-    task.images.first().map_or(Ok(()), |image| {
-        task.stimulus_for(&task.config.stimulus, image).map(drop)
-    })?;
-    Ok(Some(task))
+    Predictor::new(config, dataset, &groups, seed).map(Some)
 }
 
 /// Checks that a training would simulate as the run did: the measurement holds for no other.
@@ -442,7 +398,7 @@ fn setting(
     seed: u64,
     config: &Config,
     probing: &Probing,
-    task: Option<&Task>,
+    task: Option<&Predictor>,
 ) -> Result<ResponseSetting, Error> {
     Ok(ResponseSetting {
         seed,
@@ -457,74 +413,12 @@ fn setting(
     })
 }
 
-impl Task {
-    fn stimulus_for(
-        &self,
-        stimulus: &StimulusParams,
-        image: &ImageRef,
-    ) -> Result<Grid<f64>, Error> {
-        stimulus_for(
-            &self.config.body,
-            stimulus,
-            &self.dataset,
-            Split::Train,
-            image.index,
-        )
-    }
-
-    /// Estimates the accuracy that training could reach, under the best window.
-    fn taught(
-        &self,
-        gait: &Gait,
-        response: &Response,
-        shown: &[RandomRollout],
-        session: &Session,
-    ) -> Result<Option<TrainingEstimate>, Error> {
-        let config = &self.config;
-        let (mut stimulus, mut margin) = (config.stimulus, None);
-        if config.train.windows > 0 {
-            let windows = Windows::of(config, &self.dataset, &self.images, self.groups.classes())?;
-            let found = windows.best(gait, response, session, &|_| ())?;
-            stimulus.margin = found.margins;
-            margin = Some(found.margins);
-        }
-        let [first, _] = self.groups.classes();
-        let ways = balanced(self.images.iter().map(|image| image.label), first);
-        let example = |(image, (right, weight)): (&ImageRef, (f64, f64))| {
-            let seen = self.stimulus_for(&stimulus, image)?;
-            Ok(Example {
-                right,
-                weight,
-                ..Example::new(gait, &seen, &config.physics)
-            })
-        };
-        let examples = self
-            .images
-            .iter()
-            .zip(ways)
-            .map(example)
-            .collect::<Result<Vec<Example>, Error>>()?;
-        let found = teachable(
-            shown,
-            response.scatter,
-            &examples,
-            answer::THRESHOLD,
-            config.seed,
-            session,
-        )?;
-        Ok(found.map(|teachable| TrainingEstimate {
-            margin,
-            ..teachable.into()
-        }))
-    }
-}
-
 /// The parts of a measurement that all robots share.
 struct Measuring<'a> {
     options: &'a ResponseOptions,
     config: &'a Config,
     probing: Probing,
-    task: Option<Task>,
+    task: Option<Predictor>,
     earlier: Vec<(PathBuf, ResponseFile)>,
     run_sha256: &'a str,
     seed: u64,

@@ -8,10 +8,12 @@ use crate::base::remedy::{Invocation, Remedy};
 use crate::commands::tasks::task::selection;
 use crate::commands::tasks::{AuditStep, EvalStep, Run, Steps, Task, TrainRun};
 use crate::config::{Config, Settings, flatten, reading};
+use crate::images::whereabouts::Whereabouts;
 use crate::shipped;
 use crate::store::folder::{self, one_run};
 use crate::store::stored_run::StoredRun;
-use crate::task::grouping::{Groups, groups_text};
+use crate::task::class_names::ClassNames;
+use crate::task::grouping::Groups;
 use crate::training;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -139,7 +141,7 @@ impl SweepPlan {
         if self.pairs.len() == 1 {
             return Err(Error::at_key("pairs", "expected two or more classes"));
         }
-        self.groups()?;
+        self.groups(None)?;
         self.varied()?;
         self.steps().validate(self.archive.is_some())
     }
@@ -151,20 +153,24 @@ impl SweepPlan {
         }
     }
 
-    /// Returns the two groups of each task, if the plan names any.
-    fn groups(&self) -> Result<Vec<Groups>, Error> {
+    /// Returns the two groups of each task, if the plan names any; `None`: the names of the classes
+    /// are not known yet, and groups named by them are left out.
+    fn groups(&self, names: Option<&ClassNames>) -> Result<Vec<Groups>, Error> {
         let mut all: Vec<Groups> = Vec::new();
         for (number, text) in (1..).zip(&self.groups) {
-            all.push(
-                text.parse()
-                    .map_err(|error: String| Error::at_key(&format!("groups.{number}"), error))?,
-            );
+            let may_have_names = names.is_none() && text.contains('|');
+            match names.unwrap_or(&ClassNames::default()).read(text) {
+                Ok(groups) => all.push(groups),
+                Err(_) if may_have_names && text.contains(char::is_alphabetic) => {}
+                Err(error) => return Err(Error::at_key(&format!("groups.{number}"), error)),
+            }
         }
         for (k, &a) in self.pairs.iter().enumerate() {
             all.extend(
                 self.pairs[k + 1..]
                     .iter()
-                    .map(|&b| [vec![a.min(b)], vec![a.max(b)]].into()),
+                    .map(|&b| Groups::from([vec![a.min(b)], vec![a.max(b)]]))
+                    .map(|pair| pair.named(names.unwrap_or(&ClassNames::default()))),
             );
         }
         // Robots choose which group walks which way, so 1|0 is 0|1.
@@ -181,7 +187,7 @@ impl SweepPlan {
                 "expected different ones, also of pairs",
             ));
         }
-        if self.archive.is_some() && all.is_empty() {
+        if self.archive.is_some() && self.groups.is_empty() && all.is_empty() {
             return Err(Error::at_key(
                 "groups",
                 "expected groups or pairs, which are trained",
@@ -242,7 +248,7 @@ impl SweepPlan {
 
     /// Returns the tasks, numbered from 1 in this order: varied keys by their names, the last one
     /// changing fastest; then groups; then seeds.
-    pub(crate) fn tasks(&self, path: &Path) -> Result<Vec<Task>, Vec<Error>> {
+    pub(crate) fn tasks(&self, path: &Path, data: Option<&Path>) -> Result<Vec<Task>, Vec<Error>> {
         let one = |error: Error| vec![error.in_place(&path.display().to_string())];
         let sets = |wanted: &dyn Fn(&str) -> bool| {
             self.set
@@ -260,7 +266,9 @@ impl SweepPlan {
             )));
         }
         let base = self.base(path).map_err(one)?;
-        let (groups, varied) = (self.groups().map_err(one)?, self.varied().map_err(one)?);
+        let names = self.class_names(&base, data).map_err(one)?;
+        let groups = self.groups(Some(&names)).map_err(one)?;
+        let varied = self.varied().map_err(one)?;
         let seeds = match (&base, self.seeds.as_slice()) {
             (Base::Evolve(_, config), []) => vec![config.seed],
             (Base::Train(_, source), []) => vec![source.run.config.seed],
@@ -334,6 +342,20 @@ impl SweepPlan {
             }
         }
         Ok(tasks)
+    }
+
+    /// Returns the names of the classes of the dataset that all tasks share.
+    fn class_names(&self, base: &Base, data: Option<&Path>) -> Result<ClassNames, Error> {
+        let (config, whereabouts) = match base {
+            Base::Evolve(_, config) => (config.as_ref(), Whereabouts::given(data)),
+            Base::Train(archive, source) => {
+                (&source.run.config, Whereabouts::given(data).and_of(archive))
+            }
+        };
+        if self.groups.is_empty() && self.pairs.is_empty() {
+            return Ok(ClassNames::default());
+        }
+        training::class_names(config, &self.set, &whereabouts)
     }
 
     fn base(&self, path: &Path) -> Result<Base, Error> {
@@ -451,9 +473,7 @@ impl Base {
             },
         };
         let words = combination.iter().map(|setting| setting.word.clone());
-        let groups = groups
-            .map(Groups::classes)
-            .map(|[a, b]| groups_text([a, b], "v"));
+        let groups = groups.map(Groups::in_files);
         let parts = std::iter::once(base)
             .chain(words)
             .chain(groups)
@@ -540,7 +560,7 @@ mod tests {
     }
 
     fn names(text: &str) -> Vec<String> {
-        let tasks = plan(text).tasks(Path::new("plan.toml")).unwrap();
+        let tasks = plan(text).tasks(Path::new("plan.toml"), None).unwrap();
         tasks.into_iter().map(|task| task.name).collect()
     }
 
@@ -569,7 +589,7 @@ mod tests {
     fn a_task_has_the_config_that_its_name_says() {
         let text = "config = \"four_digit.toml\"\nseeds = [7]\ngroups = [\"0|123\"]\nset = [\"generations=9\"]\n\
                     [vary]\narchive.keep = [3]";
-        let tasks = plan(text).tasks(Path::new("plan.toml")).unwrap();
+        let tasks = plan(text).tasks(Path::new("plan.toml"), None).unwrap();
         let Run::Evolve(config, ..) = &tasks[0].run else {
             panic!("it evolves")
         };
@@ -580,7 +600,7 @@ mod tests {
     #[test]
     fn all_that_is_wrong_is_said_at_once_with_the_tasks() {
         let text = "config = \"quickstart.toml\"\nseeds = [1, 2]\n[vary]\ngenerations = [0, 5, -1]\nbody.heihgt = [3]";
-        let errors = plan(text).tasks(Path::new("plan.toml")).unwrap_err();
+        let errors = plan(text).tasks(Path::new("plan.toml"), None).unwrap_err();
         let said: Vec<String> = errors.iter().map(ToString::to_string).collect();
         assert_eq!(
             said.len(),
@@ -592,7 +612,7 @@ mod tests {
             "{said:?}"
         );
         let text = text.replace("body.heihgt = [3]", "");
-        let errors = plan(&text).tasks(Path::new("plan.toml")).unwrap_err();
+        let errors = plan(&text).tasks(Path::new("plan.toml"), None).unwrap_err();
         let said: Vec<String> = errors.iter().map(ToString::to_string).collect();
         assert!(
             said.len() == 2
@@ -660,7 +680,7 @@ mod tests {
         ] {
             let text =
                 format!("config = \"quickstart.toml\"\n[vary]\n{vary}\ngenerations = [5, 6]");
-            let errors = plan(&text).tasks(Path::new("plan.toml")).unwrap_err();
+            let errors = plan(&text).tasks(Path::new("plan.toml"), None).unwrap_err();
             let said = errors[0].to_string();
             assert!(
                 said.contains("are the same: expected different values"),
@@ -693,7 +713,7 @@ mod tests {
             ("[eval]\nimages = 1", "eval.images"),
         ] {
             let errors = plan(&format!("config = \"quickstart.toml\"\n{text}"))
-                .tasks(Path::new("plan.toml"));
+                .tasks(Path::new("plan.toml"), None);
             let said = errors.unwrap_err()[0].to_string();
             assert!(said.contains(key), "{said}");
         }

@@ -86,6 +86,7 @@ pub fn train(options: &TrainOptions, session: &Session) -> Result<TrainOutcome, 
         &options.set,
     )?;
     let dataset = whereabouts.load(&config.data, &[Split::Train])?;
+    let config = config.with_names_of(&dataset);
     check_groups(&options.groups, &dataset)?;
     whereabouts::say_transposed(&dataset, &config.data, session);
     let of_gaits = &source.run;

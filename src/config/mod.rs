@@ -20,12 +20,14 @@ pub(crate) use crate::config::task::TaskConfig;
 use crate::config::train::TrainConfig;
 use crate::config::validation::{LEAST, ValidationConfig};
 use crate::data::builtin::BuiltinDigits;
-use crate::data::dataset::BUILTIN;
+use crate::data::dataset::{BUILTIN, Dataset};
+use crate::data::description::check_names;
 use crate::data::files::check_name;
 use crate::genome::{BodySpec, MutationParams};
 use crate::qd::EmitterParams;
 use crate::response::objective::GaitResponse;
 use crate::sim::Physics;
+use crate::task::class_names::ClassNames;
 use crate::task::evaluation::Savings;
 use crate::task::fitness::{Fitness, LEAST_IMAGES};
 use crate::task::grouping::Grouping;
@@ -199,6 +201,10 @@ pub struct DataConfig {
     /// mirrored and turned. Default: true for EMNIST, recognised by its names.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) transpose: Option<bool>,
+    /// The names of the classes, from class 0, for tables and pictures. Default: those in the
+    /// dataset's own `dataset.json`, else the classes have numbers.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) class_names: Vec<String>,
     /// The training images by index, in the order of a sequential rollout.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub train_images: Option<Vec<usize>>,
@@ -221,6 +227,7 @@ impl DataConfig {
             dataset: dataset.to_string(),
             dir: None,
             transpose: None,
+            class_names: Vec::new(),
             train_images: None,
             ..self.clone()
         }
@@ -367,6 +374,7 @@ impl Config {
             checkpoint: CheckpointConfig::default(),
             data: DataConfig {
                 dir: None,
+                class_names: Vec::new(),
                 ..self.data.clone()
             },
             ..self.clone()
@@ -414,7 +422,27 @@ impl Config {
     /// # Errors
     /// Returns an error if the section `[task]` defines none.
     pub fn grouping(&self) -> Result<Grouping, Error> {
-        self.task.grouping()
+        Ok(self.task.grouping()?.named(&self.class_names()))
+    }
+
+    /// Returns the names of the classes, as far as they are known.
+    pub(crate) fn class_names(&self) -> ClassNames {
+        ClassNames::of(&self.data.class_names)
+    }
+
+    /// Calls the classes as the dataset does, unless the config names them.
+    #[must_use]
+    pub(crate) fn with_names_of(self, dataset: &Dataset) -> Self {
+        match self.data.class_names.is_empty() {
+            true => Config {
+                data: DataConfig {
+                    class_names: dataset.class_names().to_vec(),
+                    ..self.data
+                },
+                ..self
+            },
+            false => self,
+        }
     }
 
     pub(crate) fn classes(&self) -> Vec<u8> {
@@ -441,6 +469,8 @@ impl Config {
             .validate()
             .map_err(|error| Error::at_key("stimulus", error))?;
         check_name(&self.data.dataset).map_err(|error| Error::at_key("data.dataset", error))?;
+        check_names(&self.data.class_names)
+            .map_err(|error| Error::at_key("data.class_names", error))?;
         if self.data.dataset == BUILTIN && self.data.transpose == Some(true) {
             return refuse(
                 "data.transpose",

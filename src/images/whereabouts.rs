@@ -6,13 +6,15 @@ use crate::base::files::{home_expanded, write_atomically};
 use crate::base::remedy::Remedy;
 use crate::base::session::Session;
 use crate::config::{BodyConfig, Config, DataConfig, reading};
-use crate::data::dataset::{BUILTIN, Dataset, Split};
+use crate::data::dataset::{BUILTIN, Dataset, DatasetError, Split};
+use crate::data::description::Description;
 use crate::data::files;
 use crate::data::files::{DatasetPlace, default_folder, places};
 use crate::shipped::read_text;
 use crate::store::folder::{IfExists, RunFolder};
 use crate::store::images::{DatasetRef, ImageRef};
 use crate::store::names::DATA_FOLDER;
+use crate::task::class_names::ClassNames;
 use crate::task::stimulus::{StimulusParams, stimulus};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -77,14 +79,24 @@ impl Whereabouts {
         }
     }
 
-    /// Loads the dataset of a section `[data]`.
-    ///
-    /// # Errors
-    /// The error says what is missing or broken, where it was looked for, and what to do.
-    pub fn load(&self, config: &DataConfig, wanted: &[Split]) -> Result<Dataset, Error> {
-        if config.dataset == BUILTIN {
-            return Dataset::builtin(config.builtin.clone(), wanted).map_err(Error::from);
+    /// Returns the names of a dataset's classes, those of the config first; no image is read.
+    pub(crate) fn class_names(&self, config: &DataConfig) -> Result<ClassNames, Error> {
+        if !config.class_names.is_empty() || config.dataset == BUILTIN {
+            return Ok(ClassNames::of(&config.class_names));
         }
+        let (given, _) = self.places(config)?;
+        let place = files::choose(&config.dataset, &given).map_err(DatasetError::from)?;
+        let described = Description::read(&place.path)?;
+        Ok(described.map_or_else(ClassNames::default, |said| {
+            ClassNames::of(&said.class_names)
+        }))
+    }
+
+    /// Returns the folders to look in, and the one that a run remembers if it is gone.
+    fn places(
+        &self,
+        config: &DataConfig,
+    ) -> Result<(Vec<DatasetPlace>, Option<DatasetPlace>), Error> {
         let mut given = places(
             self.data.as_deref(),
             std::env::var_os("MORPHCOG_DATA"),
@@ -96,6 +108,18 @@ impl Whereabouts {
         };
         given.extend(there);
         given.extend(places(None, None, config.dir.as_deref()));
+        Ok((given, gone))
+    }
+
+    /// Loads the dataset of a section `[data]`.
+    ///
+    /// # Errors
+    /// The error says what is missing or broken, where it was looked for, and what to do.
+    pub fn load(&self, config: &DataConfig, wanted: &[Split]) -> Result<Dataset, Error> {
+        if config.dataset == BUILTIN {
+            return Dataset::builtin(config.builtin.clone(), wanted).map_err(Error::from);
+        }
+        let (given, gone) = self.places(config)?;
         Dataset::oriented(&config.dataset, &given, wanted, config.transpose).map_err(|error| {
             match gone {
                 Some(gone) => Error::from(error)

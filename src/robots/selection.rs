@@ -9,6 +9,7 @@ use crate::store::folder;
 use crate::store::run::Robot;
 use crate::store::stored_run::StoredRun;
 use crate::store::validation::{Validated, ranking};
+use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -69,6 +70,20 @@ impl FromStr for Selection {
             None => Ok(Selection::Ids(
                 text.split(',').map(|id| id.trim().to_string()).collect(),
             )),
+        }
+    }
+}
+
+impl fmt::Display for Selection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Selection::All => f.write_str("all"),
+            Selection::Top(count) => write!(f, "top:{count}"),
+            Selection::Random(count) => write!(f, "random:{count}"),
+            Selection::Validated(count) => write!(f, "{VALIDATED}:{count}"),
+            Selection::Ids(ids) => f.write_str(&ids.join(",")),
+            Selection::Drawn { about, .. } => f.write_str(about),
+            Selection::Physical(inner) => write!(f, "{inner}, physical only"),
         }
     }
 }

@@ -319,7 +319,8 @@ fn before_dot(name: &OsStr) -> Option<&[u8]> {
     name.as_encoded_bytes().split(|&byte| byte == b'.').next()
 }
 
-/// Returns the run.json at a path or in a folder, or all runs of a shipped name.
+/// Returns the run.json at a path or in a folder, or those in the folders of a folder without one,
+/// or all runs of a shipped name.
 ///
 /// # Errors
 /// Returns an error if nothing shipped has that name, or the path is another kind of file.
@@ -327,13 +328,28 @@ pub fn run_json(path: PathBuf) -> Result<Vec<PathBuf>, String> {
     if shipped::is_named(&path) {
         shipped::runs(&path)
     } else if path.is_dir() {
-        Ok(vec![path.join(RUN_JSON)])
+        let within = || runs_within(&path);
+        let own = path.join(RUN_JSON);
+        Ok(if own.exists() { vec![own] } else { within() })
     } else if path.is_file() && path.extension().is_none_or(|ending| ending != "json") {
         let text = "expected a run.json, or its folder (runs/pairs/*/, with a slash at the end, means folders only)";
         Err(text.to_string())
     } else {
         Ok(vec![path])
     }
+}
+
+/// Returns the run.json of every folder in a folder, by name, or, if there is none, its own, which
+/// is missing.
+fn runs_within(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let runs = entries.map(|entry| entry.path().join(RUN_JSON));
+    let mut runs: Vec<PathBuf> = runs.filter(|run| run.is_file()).collect();
+    runs.sort();
+    if runs.is_empty() {
+        runs.push(folder.join(RUN_JSON));
+    }
+    runs
 }
 
 /// Returns the only run at a path; several are an error.

@@ -7,16 +7,27 @@
 //! against 26, and `1|26` is 1 against 2 and 6. So a name means one task, whatever the data, and a
 //! task has one name.
 
+use crate::task::class_names::ClassNames;
 use crate::task::fitness::{Fitness, Group};
 use std::fmt;
 use std::str::FromStr;
 
-/// Classes in two groups; "all the same way" is the split with an empty second group.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Classes in two groups; "all the same way" is the split with an empty second group. Two are equal
+/// if their classes are, whatever these are called.
+#[derive(Clone, Debug)]
 pub struct ClassSplit {
     a: Vec<u8>,
     b: Vec<u8>,
+    names: ClassNames,
 }
+
+impl PartialEq for ClassSplit {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.a, &self.b) == (&other.a, &other.b)
+    }
+}
+
+impl Eq for ClassSplit {}
 
 impl ClassSplit {
     pub(crate) fn classes(&self, group: Group) -> &[u8] {
@@ -38,18 +49,19 @@ impl ClassSplit {
         self.b.is_empty()
     }
 
-    /// Returns its name, such as `0|123`, `10,11|12` or `same way`.
+    /// Returns its name, such as `0|123`, `10,11|12`, `cat|dog` or `same way`.
     pub fn name(&self) -> String {
         if self.is_same_way() {
             return "same way".to_string();
         }
-        groups_text([&self.a, &self.b], "|")
+        self.names.groups([&self.a, &self.b])
     }
 
-    /// True if a file's name is its name; older files lack the comma at the end.
+    /// True if a file's name is its name; older files lack the comma at the end, or the names of
+    /// the classes.
     pub(crate) fn is_called(&self, name: &str) -> bool {
-        let own = self.name();
-        own == name || own.strip_suffix(',') == Some(name)
+        let is = |own: &str| own == name || own.strip_suffix(',') == Some(name);
+        is(&self.name()) || !self.is_same_way() && is(&groups_text([&self.a, &self.b], "|"))
     }
 }
 
@@ -81,9 +93,34 @@ pub struct Groups {
     classes: [Vec<u8>; 2],
     /// True if there was no comma, so that every digit was a class.
     are_digits: bool,
+    names: ClassNames,
 }
 
 impl Groups {
+    /// Makes two groups of classes.
+    ///
+    /// # Errors
+    /// Returns an error if one is empty, or a class is in both.
+    pub(crate) fn of(classes: [Vec<u8>; 2]) -> Result<Self, GroupingError> {
+        Grouping::two_groups(&classes[0], &classes[1])?;
+        Ok(classes.into())
+    }
+
+    /// Calls the classes by their names.
+    #[must_use]
+    pub(crate) fn named(self, names: &ClassNames) -> Self {
+        Groups {
+            names: names.clone(),
+            ..self
+        }
+    }
+
+    /// Returns the name for a folder: `4v9`, or `cat-v-dog`.
+    pub(crate) fn in_files(&self) -> String {
+        let [a, b] = &self.classes;
+        self.names.in_files([a, b])
+    }
+
     pub(crate) fn classes(&self) -> &[Vec<u8>; 2] {
         &self.classes
     }
@@ -130,6 +167,7 @@ impl From<[Vec<u8>; 2]> for Groups {
         Groups {
             classes,
             are_digits: false,
+            names: ClassNames::default(),
         }
     }
 }
@@ -137,7 +175,7 @@ impl From<[Vec<u8>; 2]> for Groups {
 impl fmt::Display for Groups {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [a, b] = &self.classes;
-        f.write_str(&groups_text([a, b], "|"))
+        f.write_str(&self.names.groups([a, b]))
     }
 }
 
@@ -174,6 +212,7 @@ impl FromStr for Groups {
         Ok(Groups {
             classes,
             are_digits,
+            names: ClassNames::default(),
         })
     }
 }
@@ -228,6 +267,7 @@ impl Grouping {
         let tasks = vec![ClassSplit {
             a: a.to_vec(),
             b: b.to_vec(),
+            names: ClassNames::default(),
         }];
         Ok(Grouping {
             tasks,
@@ -256,17 +296,32 @@ impl Grouping {
             ClassSplit {
                 a: labels(a),
                 b: labels(b),
+                names: ClassNames::default(),
             }
         };
         let same_way = same_way_bin.then(|| ClassSplit {
             a: classes.to_vec(),
             b: Vec::new(),
+            names: ClassNames::default(),
         });
         let tasks = firsts.into_iter().map(split).chain(same_way).collect();
         Ok(Grouping {
             tasks,
             fitness: Fitness::Min,
         })
+    }
+
+    /// Calls the classes by their names.
+    #[must_use]
+    pub(crate) fn named(self, names: &ClassNames) -> Self {
+        let named = |split| ClassSplit {
+            names: names.clone(),
+            ..split
+        };
+        Grouping {
+            tasks: self.tasks.into_iter().map(named).collect(),
+            ..self
+        }
     }
 
     /// Replaces the fitness, which is the smallest margin by default.

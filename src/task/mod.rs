@@ -1,6 +1,7 @@
 //! A robot's task: stimuli, protocols, rollouts and scores; how a gait responds and is trained.
 
 pub mod answer;
+pub(crate) mod class_names;
 pub mod evaluation;
 pub mod fitness;
 pub(crate) mod grouping;

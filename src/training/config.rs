@@ -11,6 +11,7 @@ use crate::images::held_out;
 use crate::images::training::{TrainingImages, scarcest};
 use crate::images::whereabouts::{Whereabouts, part_of_others, size_of};
 use crate::store::images::DatasetRef;
+use crate::task::class_names::ClassNames;
 use crate::task::fitness::Fitness;
 use crate::task::grouping::Groups;
 use crate::task::margins::Margins;
@@ -59,6 +60,10 @@ pub(crate) fn config_of(
             .and_then(|()| check_final_images(config, groups))
     };
     let config = reading::changed(base, set, check, |error| error)?;
+    let config = Config {
+        data: own_data(of_walkers, config.data.clone()),
+        ..config
+    };
     let BodyConfig { height, width, .. } = of_walkers.body;
     if (config.body.height, config.body.width) != (height, width) {
         let found = format!("{} × {} voxels", config.body.height, config.body.width);
@@ -82,6 +87,51 @@ pub(crate) fn config_of(
         ));
     }
     Ok(config)
+}
+
+/// Reads the groups of a training, by the names of its dataset's classes or by their numbers.
+///
+/// # Errors
+/// Returns an error about the groups, or about a wrong key in `set`.
+pub(crate) fn groups_of(
+    text: &str,
+    of_walkers: &Config,
+    set: &[String],
+    whereabouts: &Whereabouts,
+) -> Result<Groups, Error> {
+    class_names(of_walkers, set, whereabouts)?
+        .read(text)
+        .map_err(Error::usage)
+}
+
+/// Returns the names of the classes of the dataset that a config has once `set` has changed it.
+pub(crate) fn class_names(
+    config: &Config,
+    set: &[String],
+    whereabouts: &Whereabouts,
+) -> Result<ClassNames, Error> {
+    whereabouts.class_names(&changed(config, set)?.data)
+}
+
+/// Changes a config of gaits by the keys in `set`, without a task to train.
+pub(crate) fn changed(config: &Config, set: &[String]) -> Result<Config, Error> {
+    let changed = reading::changed(config.clone(), set, |_| Ok(()), |error| error)?;
+    Ok(Config {
+        data: own_data(config, changed.data.clone()),
+        ..changed
+    })
+}
+
+/// Returns settings without the names of another dataset's classes.
+fn own_data(of_walkers: &Config, data: DataConfig) -> DataConfig {
+    let there = &of_walkers.data;
+    match data.dataset != there.dataset && data.class_names == there.class_names {
+        true => DataConfig {
+            class_names: Vec::new(),
+            ..data
+        },
+        false => data,
+    }
 }
 
 /// Checks that designs are compared on an image of every class; groups alternate, the first begins.

@@ -6,6 +6,7 @@
 mod config;
 pub(crate) mod gaits;
 pub(crate) mod log;
+pub(crate) mod prediction;
 pub(crate) mod race;
 pub(crate) mod rollouts;
 pub(crate) mod rounds;
@@ -13,4 +14,6 @@ pub(crate) mod trainer;
 pub(crate) mod window;
 
 pub(crate) use config::check;
-pub(crate) use config::{check_groups, config_of, with_fitting_margin, with_images};
+pub(crate) use config::{
+    changed, check_groups, class_names, config_of, groups_of, with_fitting_margin, with_images,
+};

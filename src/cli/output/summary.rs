@@ -2,6 +2,7 @@
 
 use crate::analysis::published;
 use crate::base::clock::CLOCK;
+use crate::base::error::Error;
 use crate::base::number;
 use crate::base::number::percent;
 use crate::base::shell::in_shell;
@@ -12,6 +13,8 @@ use crate::cli::output::networks;
 use crate::commands::bench::Speed;
 use crate::commands::data::FoundDataset;
 use crate::commands::evolve::EvolveOutcome;
+use crate::commands::pairs;
+use crate::commands::tasks::{Task, TaskFolders};
 use crate::commands::train;
 use crate::data::fetch::{FetchOutcome, Fetched};
 use crate::draw::report::tables::of_robot;
@@ -167,6 +170,27 @@ pub(crate) fn validation(console: &Console, best: &[Validated]) {
         &["best on validation", "task", "correct", "balanced %"],
         &rows.collect::<Vec<_>>(),
     );
+}
+
+/// Writes what became of each pair of a team.
+pub(crate) fn pairs(console: &Console, tasks: &[Task], place: &TaskFolders) -> Result<(), Error> {
+    let found = pairs::outcomes(tasks, place)?;
+    if console.mode() == Mode::Json {
+        console.event("pairs", &found);
+        return Ok(());
+    }
+    let rows = found.iter().map(|pair| {
+        vec![
+            pair.task.clone(),
+            pair.robot.clone(),
+            pair.gait.clone(),
+            pair.validation.map_or_else(String::new, percent),
+            pair.audit.clone(),
+        ]
+    });
+    let headers = ["task", "robot", "gait", "validation %", "audit"];
+    console.table(&headers, &rows.collect::<Vec<_>>());
+    Ok(())
 }
 
 /// Writes the results of an evaluation: a table per robot, the means, the baselines and the paper's

@@ -6,7 +6,7 @@ use crate::base::session::Session;
 use crate::base::text::counted;
 use crate::base::threads;
 use crate::commands::tasks::steps::{is_done, run};
-use crate::commands::tasks::task::{Run, Task, TaskFolders};
+use crate::commands::tasks::task::{BEFORE_ROUNDS, Run, Task, TaskFolders};
 use crate::config::{Config, DataConfig};
 use crate::data::dataset::{Dataset, Split};
 use crate::images::held_out;
@@ -51,6 +51,7 @@ pub(crate) fn check_data<'a>(
         let (config, whereabouts) = match &task.run {
             Run::Evolve(config, ..) => (&**config, given),
             Run::Train(training) => (&training.config, given.and_of(&training.archive)),
+            Run::Pair(pair) => (&pair.config, given.and_of(&pair.archives[0])),
         };
         let test = task
             .steps
@@ -82,8 +83,8 @@ pub(crate) fn check_data<'a>(
                 TrainingImages::images(config, dataset).map_err(named)?;
                 held_out::check(config, &[], "data.images_per_class", dataset).map_err(named)?;
             }
-            Run::Train(training) => {
-                training::with_images(training.config.clone(), &[], dataset, &Session::default())
+            Run::Train(_) | Run::Pair(_) => {
+                training::with_images(config.clone(), &[], dataset, &Session::default())
                     .map_err(named)?;
             }
         }
@@ -142,8 +143,11 @@ pub(crate) fn run_all(
             numbered.len(),
             counted(tasks.len(), "task", "tasks")
         );
-        let train = tasks.iter().all(|task| matches!(task.run, Run::Train(_)));
-        let unit = if train { "challengers" } else { "generations" };
+        let unit = match tasks.first().map(|task| &task.run) {
+            Some(Run::Train(_)) => "challengers",
+            Some(Run::Pair(_)) => "steps",
+            _ => "generations",
+        };
         session.observer.begins(&Work {
             label,
             total,
@@ -175,7 +179,9 @@ pub(crate) fn run_all(
                 index,
                 amount: task.amount(),
                 name: &task.name,
+                is_pair: matches!(task.run, Run::Pair(_)),
                 has_begun,
+                steps: AtomicU64::new(0),
             };
             let ended = catch_unwind(AssertUnwindSafe(|| {
                 run(task, place, &session.watched(&part).threads(threads))
@@ -241,6 +247,9 @@ struct Part<'a, 'o> {
     index: usize,
     amount: u64,
     name: &'a str,
+    is_pair: bool,
+    /// Steps of a pair so far.
+    steps: AtomicU64,
     /// True once it has reported the generations done before.
     has_begun: AtomicBool,
 }
@@ -273,7 +282,19 @@ impl Observer for Part<'_, '_> {
         self.is_at(generation.done);
     }
 
-    fn finding(&self, _kind: &str, fields: &Value) {
+    fn finding(&self, kind: &str, fields: &Value) {
+        if self.is_pair {
+            let done = match kind {
+                "ranked" => 2,
+                "window" => BEFORE_ROUNDS,
+                "round" | "challenge" => self.steps.load(Ordering::Relaxed) + 1,
+                _ => return,
+            };
+            // A second gait begins anew; the bar waits for it.
+            self.steps.store(done, Ordering::Relaxed);
+            self.begins_at(0);
+            return self.is_at(done.min(self.amount - 1));
+        }
         if let Some(challenger) = fields.get("challenger").and_then(Value::as_u64) {
             self.begins_at(0);
             self.is_at(challenger);

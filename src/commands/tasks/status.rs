@@ -97,7 +97,7 @@ fn status_of(
                 Some((done, seconds)).filter(|_| state != TaskState::Waiting),
             )
         }
-        Run::Train(_) => (None, None),
+        Run::Train(_) | Run::Pair(_) => (None, None),
     };
     let seconds = match (state, of_run) {
         (TaskState::Waiting, _) => None,

@@ -6,7 +6,7 @@ use crate::base::session::Session;
 use crate::commands::evolve;
 use crate::commands::tasks::task::{Run, Task, TaskFolders, selection};
 use crate::commands::train;
-use crate::commands::{audit, eval};
+use crate::commands::{audit, eval, pairs};
 use crate::robots::selection::Selection;
 use crate::search::{held_out_run, validation};
 use crate::store::eval::EvalFile;
@@ -142,6 +142,12 @@ fn steps(task: &Task, place: &TaskFolders, session: &Session) -> Result<(), Erro
             if trained.validated.is_none() {
                 return Err(stopped());
             }
+        }
+        Run::Pair(pair) => {
+            pairs::train_pair(pair, &folder, session).map_err(|error| match error.kind {
+                ErrorKind::Stopped => stopped(),
+                _ => with_task_remedies(error),
+            })?;
         }
     }
     let archive = folder.join(RUN_JSON);

@@ -33,6 +33,7 @@ pub(crate) enum Run {
     /// `evolve`, with the name of the run, and the groups of classes if the plan names them.
     Evolve(Box<Config>, String, Option<Groups>),
     Train(Box<TrainRun>),
+    Pair(Box<PairRun>),
 }
 
 impl Run {
@@ -40,6 +41,7 @@ impl Run {
         match self {
             Run::Evolve(config, ..) => config,
             Run::Train(training) => &training.config,
+            Run::Pair(pair) => &pair.config,
         }
     }
 
@@ -48,6 +50,7 @@ impl Run {
         match self {
             Run::Evolve(.., groups) => groups.as_ref(),
             Run::Train(training) => Some(&training.groups),
+            Run::Pair(pair) => Some(&pair.groups),
         }
     }
 }
@@ -65,6 +68,27 @@ pub(crate) struct TrainRun {
     pub(crate) set: Vec<String>,
     pub(crate) config: Config,
 }
+
+/// A pair of classes, trained with the best of several runs' gaits.
+#[derive(Clone, Debug)]
+pub(crate) struct PairRun {
+    /// The run.json files with the gaits.
+    pub(crate) archives: Vec<PathBuf>,
+    /// SHA-256 of each.
+    pub(crate) sha256: Vec<String>,
+    /// Robots of each whose gaits are tried.
+    pub(crate) robots: Selection,
+    pub(crate) groups: Groups,
+    /// Seed of all random numbers; `None`: that of the gaits' run.
+    pub(crate) seed: Option<u64>,
+    /// Keys that differ from those of the gaits' run.
+    pub(crate) set: Vec<String>,
+    /// The config with the first run's gaits.
+    pub(crate) config: Config,
+}
+
+/// Steps of a pair before its rounds: the choice of the gait, and of the window.
+pub(super) const BEFORE_ROUNDS: u64 = 4;
 
 /// Steps after a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -188,6 +212,13 @@ impl Task {
                     ("robots", training.robots.clone()),
                 ],
             ),
+            Run::Pair(pair) => (
+                pair.config.settings(),
+                vec![
+                    ("archives", pair.sha256.join(" ")),
+                    ("robots", pair.robots.to_string()),
+                ],
+            ),
         };
         let config = config
             .into_iter()
@@ -201,10 +232,7 @@ impl Task {
     }
 
     pub(crate) fn cycle_steps(&self) -> u32 {
-        match &self.run {
-            Run::Evolve(config, ..) => config.physics.cycle_steps,
-            Run::Train(training) => training.config.physics.cycle_steps,
-        }
+        self.run.config().physics.cycle_steps
     }
 
     /// Returns the remaining requests, which may grow or change while the task goes on.
@@ -235,6 +263,8 @@ impl Task {
                     &of(&training.config, training.sha256.clone()),
                 )
             }
+            // Its run is that of the gait which was best.
+            Run::Pair(_) => Vec::new(),
         }
     }
 
@@ -246,23 +276,35 @@ impl Task {
                 &training.config.data,
                 Whereabouts::given(None).and_of(&training.archive),
             ),
+            Run::Pair(pair) => (
+                &pair.config.data,
+                Whereabouts::given(None).and_of(&pair.archives[0]),
+            ),
         };
         whereabouts.by_default(data)
     }
 
     /// Returns the folder of the atlas that its gaits are from, if any.
     pub(crate) fn atlas(&self) -> Option<PathBuf> {
-        let Run::Train(training) = &self.run else {
-            return None;
-        };
-        shipped::atlas_of(&training.archive)
+        match &self.run {
+            Run::Evolve(..) => None,
+            Run::Train(training) => shipped::atlas_of(&training.archive),
+            Run::Pair(pair) => pair
+                .archives
+                .iter()
+                .find_map(|path| shipped::atlas_of(path)),
+        }
     }
 
-    /// Returns its amount of work for a progress bar: generations, or challengers.
+    /// Returns its amount of work for a progress bar: generations, challengers, or steps of a pair.
     pub(super) fn amount(&self) -> u64 {
         match &self.run {
             Run::Evolve(config, ..) => config.generations,
             Run::Train(training) => training.config.train.challengers as u64,
+            Run::Pair(pair) => {
+                let train = &pair.config.train;
+                (train.rounds + train.challengers) as u64 + BEFORE_ROUNDS
+            }
         }
     }
 }
