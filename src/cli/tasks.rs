@@ -215,7 +215,7 @@ pub(super) fn warn_of_gaits(tasks: &[Task], console: &Console) {
     // All tasks train the gaits of one archive.
     match tasks.first().map(|task| &task.run) {
         Some(Run::Train(training)) => choice::warn_of_versions([&training.archive], console),
-        Some(Run::Pair(pair)) => choice::warn_of_versions(&pair.archives, console),
+        Some(Run::Pair(pair)) => choice::warn_of_versions(&pair.gaits.archives, console),
         _ => {}
     }
 }

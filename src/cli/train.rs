@@ -16,7 +16,7 @@ use crate::cli::{Resources, in_session};
 use crate::commands::audit;
 use crate::commands::evolve;
 use crate::commands::pairs;
-use crate::commands::pairs::PairsOptions;
+use crate::commands::pairs::{Gaits, PairsOptions};
 use crate::commands::tasks;
 use crate::commands::tasks::{Run, TaskFolders};
 use crate::commands::train;
@@ -64,7 +64,7 @@ elsewhere. Exit code 0: all pairs are done; 1: some failed; 75: stopped.";
 
 /// Help for `--archive`, whose default depends on `--pairs`.
 const ARCHIVE: &str = "The run.json of the gaits, or its folder (default: the newest under runs/; with --pairs \
-gallery:gaits, and several may follow)";
+gallery:gaits); of several, the gait is trained whose response predicts the highest accuracy";
 
 #[derive(Debug, Args)]
 #[command(mut_arg("archive", |archive| archive.help(ARCHIVE)))]
@@ -138,24 +138,18 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
     if args.pairs {
         return pairs(args, console);
     }
-    let archive = match args.archives.paths().as_slice() {
-        [] => folder::newest_run()?,
-        [archive] => archive.clone(),
-        several => {
-            let text = format!("expected the gaits of one run, these are {}", several.len());
-            let first = folder::name(&several[0]);
-            let error = Error::usage(text).about("archive");
-            return Err(error.advice(format!("name one, such as {first}")));
-        }
-    };
-    let robots = selected(args.robots)?.unwrap_or(Selection::Top(GAITS));
+    let mut archives = args.archives.paths();
+    if archives.is_empty() {
+        archives.push(folder::newest_run()?);
+    }
+    let robots = selected(args.robots)?;
     let dataset = args
         .dataset
         .iter()
         .map(|name| format!("data.dataset={name}"));
     let set: Vec<String> = dataset.chain(args.set).collect();
-    let whereabouts = Whereabouts::given(args.data.as_deref()).and_of(&archive);
-    let of_gaits = robots::open(&archive)?;
+    let whereabouts = Whereabouts::given(args.data.as_deref()).and_of(&archives[0]);
+    let of_gaits = robots::open(&archives[0])?;
     let text = args
         .task
         .as_deref()
@@ -167,6 +161,22 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
                 Some(_) => error,
             }
         })?;
+    let with = Resources::of(args.threads, args.data);
+    let (archive, robots) = match archives.as_slice() {
+        [archive] => (archive.clone(), robots.unwrap_or(Selection::Top(GAITS))),
+        _ => {
+            let gaits = Gaits {
+                archives,
+                robots: robots.unwrap_or(Selection::Top(GAITS_OF_EACH)),
+                groups: groups.clone(),
+                seed: args.seed,
+                set: set.clone(),
+            };
+            in_session(console, with.clone(), |session| {
+                pairs::best_gait(&gaits, session)
+            })?
+        }
+    };
     let name = name(&archive, &groups, args.seed);
     let beside = match shipped::is_named(&archive) {
         true => Some(Path::new(folder::RUNS)),
@@ -191,7 +201,7 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
         out,
         if_exists,
     };
-    trained(&options, Resources::of(args.threads, args.data), console)
+    trained(&options, with, console)
 }
 
 /// Default number of gaits to try.
@@ -212,7 +222,7 @@ fn name(archive: &Path, groups: &Groups, seed: Option<u64>) -> String {
     format!("{of}-{}{seed}", groups.in_files())
 }
 
-/// Gaits of each archive that a pair tries.
+/// Gaits of each of several archives that a training chooses from.
 const GAITS_OF_EACH: usize = 5;
 
 /// Trains the pairs of a team, or handles a request about them.
@@ -268,7 +278,7 @@ fn pairs(args: TrainArgs, console: &Console) -> Result<(), Error> {
     warn_of_gaits(&tasks, console);
     let summary = in_session(console, with.with(), |session| {
         if let Some(Run::Pair(pair)) = tasks.first().map(|task| &task.run) {
-            pairs::measure(pair, session)?;
+            pairs::measure(&pair.gaits, session)?;
         }
         tasks::run_all(&tasks, &place, jobs.map(usize::from), session)
     })?;

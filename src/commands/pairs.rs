@@ -5,11 +5,14 @@
 
 use crate::base::error::Error;
 use crate::base::files::{read_bytes, write_atomically};
+use crate::base::number;
+use crate::base::remedy::Remedy;
 use crate::base::session::Session;
 use crate::base::stop::Stopped;
 use crate::base::table;
 use crate::commands::audit;
 use crate::commands::response::{self, ResponseOptions};
+pub(crate) use crate::commands::tasks::Gaits;
 use crate::commands::tasks::{AuditStep, PairRun, Run, Steps, Task, TaskFolders};
 use crate::commands::train::{self, TrainOptions};
 use crate::config::Config;
@@ -134,12 +137,14 @@ impl PairsOptions {
                     name: groups.in_files(),
                     varied: vec![("groups".to_string(), groups.to_string())],
                     run: Run::Pair(Box::new(PairRun {
-                        archives: self.archives.clone(),
+                        gaits: Gaits {
+                            archives: self.archives.clone(),
+                            robots: self.robots.clone(),
+                            groups,
+                            seed: self.seed,
+                            set: set.clone(),
+                        },
                         sha256: sources.iter().map(|of| of.run.fingerprint()).collect(),
-                        robots: self.robots.clone(),
-                        groups,
-                        seed: self.seed,
-                        set: set.clone(),
                         config,
                     })),
                     steps: Steps {
@@ -186,16 +191,12 @@ impl PairsOptions {
 ///
 /// # Errors
 /// Returns an error if a run has no such robots, or if it was stopped.
-pub(crate) fn measure(pair: &PairRun, session: &Session) -> Result<(), Error> {
-    for archive in &pair.archives {
+pub(crate) fn measure(of: &Gaits, session: &Session) -> Result<(), Error> {
+    for archive in &of.archives {
         let source = robots::open(archive)?;
-        let config = training::config_of(
-            &source.run.config,
-            pair.groups.classes(),
-            pair.seed,
-            &pair.set,
-        )?;
-        let gaits = candidates(&source, &pair.robots, &config.train, config.seed)?;
+        let config =
+            training::config_of(&source.run.config, of.groups.classes(), of.seed, &of.set)?;
+        let gaits = candidates(&source, &of.robots, &config.train, config.seed)?;
         let known = measured(&source, &config, &probing(&source), &gaits, session);
         let count = config.train.random_images;
         let unknown: Vec<String> = gaits
@@ -249,18 +250,36 @@ struct Ranked {
     interval: [f64; 2],
 }
 
+/// Returns the gait that a training would begin with: its run, and itself.
+///
+/// # Errors
+/// Returns an error if none can be trained, or if it was stopped.
+pub(crate) fn best_gait(of: &Gaits, session: &Session) -> Result<(PathBuf, Selection), Error> {
+    measure(of, session)?;
+    let ranked = session.pool()?.install(|| ranked(of, session))?;
+    let best = ranked.into_iter().next().ok_or_else(unstable)?;
+    session.observer.note(&format!(
+        "{} of {}: {} % are predicted, the most of all gaits",
+        best.id,
+        name(&best.archive),
+        number::percent(best.accuracy)
+    ));
+    Ok((best.archive, Selection::Ids(vec![best.id])))
+}
+
+fn unstable() -> Error {
+    let text = "none of the chosen robots is stable with random images".to_string();
+    Error::input(text).remedy(Remedy::ChooseRobots(None))
+}
+
 /// Predicts the accuracy of every gait; the best come first, gaits of equal accuracy in their
 /// order.
-fn ranked(pair: &PairRun, session: &Session) -> Result<Vec<Ranked>, Error> {
+fn ranked(of: &Gaits, session: &Session) -> Result<Vec<Ranked>, Error> {
     let mut all = Vec::new();
-    for archive in &pair.archives {
+    for archive in &of.archives {
         let source = robots::open(archive)?;
-        let config = training::config_of(
-            &source.run.config,
-            pair.groups.classes(),
-            pair.seed,
-            &pair.set,
-        )?;
+        let config =
+            training::config_of(&source.run.config, of.groups.classes(), of.seed, &of.set)?;
         let whereabouts = Whereabouts::given(session.data_folder()).and_of(archive);
         let dataset = whereabouts.load(&config.data, &[Split::Train])?;
         let of_run = &source.run;
@@ -269,7 +288,7 @@ fn ranked(pair: &PairRun, session: &Session) -> Result<Vec<Ranked>, Error> {
             &of_run.dataset,
             &of_run.config,
             &dataset,
-            &pair.set,
+            &of.set,
             session,
         );
         let windows = WINDOWS.min(config.train.windows);
@@ -281,10 +300,10 @@ fn ranked(pair: &PairRun, session: &Session) -> Result<Vec<Ranked>, Error> {
             ..config
         };
         let seed = config.seed;
-        let gaits = candidates(&source, &pair.robots, &config.train, seed)?;
+        let gaits = candidates(&source, &of.robots, &config.train, seed)?;
         let probing = probing(&source);
         let known = measured(&source, &config, &probing, &gaits, session);
-        let predictor = Predictor::new(config, dataset, &pair.groups, seed)?;
+        let predictor = Predictor::new(config, dataset, &of.groups, seed)?;
         for (gait, known) in gaits.iter().zip(known) {
             session.check()?;
             let found = predicted(&predictor, gait, &known, &probing, session)?;
@@ -350,19 +369,18 @@ struct Trained {
 ///
 /// # Errors
 /// Returns an error if data or runs are unsuitable, or if it was stopped.
-pub(crate) fn train_pair(pair: &PairRun, folder: &Path, session: &Session) -> Result<(), Error> {
-    measure(pair, session)?;
-    let ranked = session.pool()?.install(|| ranked(pair, session))?;
+pub(crate) fn train_pair(of: &Gaits, folder: &Path, session: &Session) -> Result<(), Error> {
+    measure(of, session)?;
+    let ranked = session.pool()?.install(|| ranked(of, session))?;
     if ranked.is_empty() {
-        let text = "none of the chosen robots is stable with random images".to_string();
-        return Err(Error::input(text));
+        return Err(unstable());
     }
     write_ranking(folder, &ranked)?;
     let best = serde_json::json!({ "gaits": ranked.len(), "best": ranked[0].id });
     session.observer.finding("ranked", &best);
     let mut best: Option<Trained> = None;
     for (number, gait) in (1..).zip(ranked.iter().take(GAITS)) {
-        let trained = trained(pair, gait, folder.join(format!("gait-{number}")), session)?;
+        let trained = trained(of, gait, folder.join(format!("gait-{number}")), session)?;
         let is_better = best.as_ref().is_none_or(|best| {
             (trained.is_physical, trained.accuracy) > (best.is_physical, best.accuracy)
         });
@@ -379,7 +397,7 @@ pub(crate) fn train_pair(pair: &PairRun, folder: &Path, session: &Session) -> Re
 }
 
 fn trained(
-    pair: &PairRun,
+    of: &Gaits,
     gait: &Ranked,
     folder: PathBuf,
     session: &Session,
@@ -387,10 +405,10 @@ fn trained(
     let options = TrainOptions {
         archive: gait.archive.clone(),
         robots: Selection::Ids(vec![gait.id.clone()]),
-        groups: pair.groups.clone(),
-        seed: pair.seed,
-        set: pair.set.clone(),
-        name: pair.groups.in_files(),
+        groups: of.groups.clone(),
+        seed: of.seed,
+        set: of.set.clone(),
+        name: of.groups.in_files(),
         out: folder.clone(),
         if_exists: IfExists::Resume,
     };
@@ -435,7 +453,7 @@ pub(crate) struct PairOutcome {
     pub(crate) audit: String,
 }
 
-/// Returns the outcome of each trained pair.
+/// Returns the outcome of each trained of.
 ///
 /// # Errors
 /// Returns an error if a file is missing or broken.

@@ -14,7 +14,7 @@ pub const ZERO_ONE: &str = "gallery:zero_one";
 /// A robot for each pair of digits; together they answer as a team.
 pub const TEAM: &str = "gallery:team";
 
-/// Gaits to train, as in `demo`; they have no task, so they are not in `gallery:all`.
+/// Gaits to train, those of `demo` first; they have no task, so they are not in `gallery:all`.
 pub(crate) const GAITS: &str = "gallery:gaits";
 
 /// All runs that have a task.
@@ -57,6 +57,25 @@ macro_rules! tasks {
     };
 }
 
+#[cfg(feature = "gallery")]
+macro_rules! gaits {
+    ($name:literal, $folder:literal) => {
+        (
+            $name,
+            &[
+                (
+                    "run.json",
+                    include_str!(concat!("../../data/", $folder, "/run.json")),
+                ),
+                (
+                    "response.json",
+                    include_str!(concat!("../../data/", $folder, "/response.json")),
+                ),
+            ],
+        )
+    };
+}
+
 #[cfg(not(feature = "gallery"))]
 const SETS: &[Set] = &[];
 
@@ -86,16 +105,10 @@ const SETS: &[Set] = &[
     ),
     (
         GAITS,
-        &[(
-            "gallery:gaits-6",
-            &[
-                ("run.json", include_str!("../../data/gaits/seed-6/run.json")),
-                (
-                    "response.json",
-                    include_str!("../../data/gaits/seed-6/response.json"),
-                ),
-            ],
-        )],
+        &[
+            gaits!("gallery:gaits-6", "gaits/seed-6"),
+            gaits!("gallery:gaits-1", "gaits/seed-1"),
+        ],
     ),
 ];
 

@@ -51,7 +51,7 @@ pub(crate) fn check_data<'a>(
         let (config, whereabouts) = match &task.run {
             Run::Evolve(config, ..) => (&**config, given),
             Run::Train(training) => (&training.config, given.and_of(&training.archive)),
-            Run::Pair(pair) => (&pair.config, given.and_of(&pair.archives[0])),
+            Run::Pair(pair) => (&pair.config, given.and_of(&pair.gaits.archives[0])),
         };
         let test = task
             .steps

@@ -11,5 +11,5 @@ pub(crate) use all::{TasksSummary, check_data, run_all};
 pub(crate) use status::{TaskStatus, status};
 pub(crate) use steps::run;
 pub(crate) use task::{
-    AuditStep, EvalStep, PairRun, Run, Steps, Task, TaskFolders, TrainRun, check_folders,
+    AuditStep, EvalStep, Gaits, PairRun, Run, Steps, Task, TaskFolders, TrainRun, check_folders,
 };

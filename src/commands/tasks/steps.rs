@@ -144,7 +144,7 @@ fn steps(task: &Task, place: &TaskFolders, session: &Session) -> Result<(), Erro
             }
         }
         Run::Pair(pair) => {
-            pairs::train_pair(pair, &folder, session).map_err(|error| match error.kind {
+            pairs::train_pair(&pair.gaits, &folder, session).map_err(|error| match error.kind {
                 ErrorKind::Stopped => stopped(),
                 _ => with_task_remedies(error),
             })?;

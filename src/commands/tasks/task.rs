@@ -50,7 +50,7 @@ impl Run {
         match self {
             Run::Evolve(.., groups) => groups.as_ref(),
             Run::Train(training) => Some(&training.groups),
-            Run::Pair(pair) => Some(&pair.groups),
+            Run::Pair(pair) => Some(&pair.gaits.groups),
         }
     }
 }
@@ -72,19 +72,25 @@ pub(crate) struct TrainRun {
 /// A pair of classes, trained with the best of several runs' gaits.
 #[derive(Clone, Debug)]
 pub(crate) struct PairRun {
-    /// The run.json files with the gaits.
-    pub(crate) archives: Vec<PathBuf>,
-    /// SHA-256 of each.
+    pub(crate) gaits: Gaits,
+    /// SHA-256 of each run.json.
     pub(crate) sha256: Vec<String>,
-    /// Robots of each whose gaits are tried.
-    pub(crate) robots: Selection,
-    pub(crate) groups: Groups,
-    /// Seed of all random numbers; `None`: that of the gaits' run.
-    pub(crate) seed: Option<u64>,
-    /// Keys that differ from those of the gaits' run.
-    pub(crate) set: Vec<String>,
     /// The config with the first run's gaits.
     pub(crate) config: Config,
+}
+
+/// Gaits of several runs, of which the best is trained for a task.
+#[derive(Clone, Debug)]
+pub(crate) struct Gaits {
+    /// The run.json files.
+    pub(crate) archives: Vec<PathBuf>,
+    /// Robots of each run whose gaits are tried.
+    pub(crate) robots: Selection,
+    pub(crate) groups: Groups,
+    /// Seed of all random numbers; `None`: that of each run.
+    pub(crate) seed: Option<u64>,
+    /// Keys that differ from those of the runs.
+    pub(crate) set: Vec<String>,
 }
 
 /// Steps of a pair before its rounds: the choice of the gait, and of the window.
@@ -216,7 +222,7 @@ impl Task {
                 pair.config.settings(),
                 vec![
                     ("archives", pair.sha256.join(" ")),
-                    ("robots", pair.robots.to_string()),
+                    ("robots", pair.gaits.robots.to_string()),
                 ],
             ),
         };
@@ -278,7 +284,7 @@ impl Task {
             ),
             Run::Pair(pair) => (
                 &pair.config.data,
-                Whereabouts::given(None).and_of(&pair.archives[0]),
+                Whereabouts::given(None).and_of(&pair.gaits.archives[0]),
             ),
         };
         whereabouts.by_default(data)
@@ -290,6 +296,7 @@ impl Task {
             Run::Evolve(..) => None,
             Run::Train(training) => shipped::atlas_of(&training.archive),
             Run::Pair(pair) => pair
+                .gaits
                 .archives
                 .iter()
                 .find_map(|path| shipped::atlas_of(path)),
