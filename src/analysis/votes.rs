@@ -3,7 +3,7 @@
 use crate::base::statistics::wilson;
 use crate::search::held_out_run::Trial;
 use crate::store::images::ImageRef;
-use crate::store::team::{Accuracy, Answers, Decoded, Member, TeamFile};
+use crate::store::team::{Accuracy, Answers, Decoded, Member, TeamFile, Walk};
 use crate::task::answer::{Assignment, Direction, Readout, is_correct};
 use crate::task::fitness::Group;
 use serde::Serialize;
@@ -128,8 +128,31 @@ impl Accuracy {
 }
 
 impl Member {
-    /// Creates a member from a run's robot and its displacements, with its accuracy.
-    pub(crate) fn new(trial: &Trial, run_sha256: &str, displacements: Vec<Option<f64>>) -> Self {
+    /// Creates a member from a run's robot and its walks so far, with its accuracy; `None` without
+    /// any.
+    pub(crate) fn of(trial: &Trial, run_sha256: &str, walks: &[Walk]) -> Option<Self> {
+        let shown: Vec<usize> = (0..walks.len())
+            .filter(|place| walks[*place].is_some())
+            .collect();
+        let images: Vec<ImageRef> = shown.iter().map(|place| trial.images[*place]).collect();
+        let known: Vec<Option<f64>> = shown.iter().filter_map(|place| walks[*place]).collect();
+        let trial = Trial {
+            images: &images,
+            ..*trial
+        };
+        let member = Member::new(&trial, run_sha256, known);
+        match shown.len() {
+            0 => None,
+            all if all == walks.len() => Some(member),
+            _ => Some(Member {
+                displacements: walks.iter().map(|walk| walk.flatten()).collect(),
+                shown,
+                ..member
+            }),
+        }
+    }
+
+    fn new(trial: &Trial, run_sha256: &str, displacements: Vec<Option<f64>>) -> Self {
         let Trial {
             run,
             robot,
@@ -161,6 +184,7 @@ impl Member {
             own,
             not_moved: still as f64 / images.len().max(1) as f64,
             displacements,
+            shown: Vec::new(),
         }
     }
 }
@@ -204,6 +228,29 @@ impl TeamFile {
             .zip(&self.members)
             .map(|(sides, member)| (sides, member.displacements[image]));
         Ballot::count(&self.classes, walks, self.threshold, self.clip)
+    }
+
+    /// Returns the part of an unfinished test that all robots have done; `None` if there is none.
+    pub(crate) fn so_far(&self) -> Option<Self> {
+        let walks: Vec<Vec<Walk>> = self.members.iter().map(Member::walks).collect();
+        let is_whole = |place: &usize| walks.iter().all(|walks| walks[*place].is_some());
+        let whole: Vec<usize> = (0..self.images.len()).filter(is_whole).collect();
+        if whole.is_empty() || self.members.len() < self.size {
+            return None;
+        }
+        let part = |member: &Member| Member {
+            displacements: whole
+                .iter()
+                .map(|place| member.displacements[*place])
+                .collect(),
+            shown: Vec::new(),
+            ..member.clone()
+        };
+        Some(TeamFile {
+            images: whole.iter().map(|place| self.images[*place]).collect(),
+            members: self.members.iter().map(part).collect(),
+            ..self.clone()
+        })
     }
 
     /// Returns the members' joint answers to all images.

@@ -1,6 +1,7 @@
 //! `morphcog team`: parses its arguments and runs it.
 
 use crate::base::error::Error;
+use crate::base::number::percent;
 use crate::base::remedy::Remedy;
 use crate::base::text::counted;
 use crate::cli::choice;
@@ -107,8 +108,17 @@ pub(super) fn run(args: TeamArgs, console: &Console) -> Result<(), Error> {
         return Err(error);
     }
     if file.answers.is_none() {
-        let (shown, all) = (file.members.len(), counted(file.size, "robot", "robots"));
-        let text = format!("stopped after {shown} of {all}; what is done is saved");
+        let text = match file.so_far() {
+            Some(part) => format!(
+                "stopped after {} of {}, of which {} % are read; what is done is saved",
+                part.images.len(),
+                counted(file.images.len(), "image", "images"),
+                percent(part.decided().votes.accuracy.accuracy)
+            ),
+            None => {
+                "stopped before all robots had seen an image; what is done is saved".to_string()
+            }
+        };
         return Err(Error::stopped(text).remedy(Remedy::Repeat));
     }
     Ok(())

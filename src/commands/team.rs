@@ -6,7 +6,7 @@ use crate::base::error::Error;
 use crate::base::observer::Work;
 use crate::base::remedy::Remedy;
 use crate::base::session::Session;
-use crate::base::text::counted;
+use crate::base::text::{counted, duration};
 use crate::baseline::linear::{LabelledPixels, Linear, PixelMoments};
 use crate::baseline::nearest::nearest;
 use crate::commands::eval::images::chosen_by;
@@ -26,7 +26,7 @@ use crate::store::names::{TEAM_JSON, TEAM_VALIDATION_JSON};
 use crate::store::results::{self, replaced};
 use crate::store::run::different;
 use crate::store::stored_run::StoredRun;
-use crate::store::team::Accuracy;
+use crate::store::team::{Accuracy, Walk};
 use crate::store::team::{FORMAT, FORMAT_VERSION, Member, TeamBaselines, TeamFile};
 use crate::store::unwritten::Unwritten;
 use crate::store::validation::most_images as shown_for_validation;
@@ -37,6 +37,19 @@ use crate::task::grouping::{self};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// Fewest images of a block: each robot walks under all of a block before the next begins.
+const BLOCK: usize = 20;
+
+/// Fewest images of a block for each thread: two packs of rollouts that are simulated together.
+const PER_THREAD: usize = 16;
+
+/// Time between two writes of an unfinished test.
+const WRITE_EVERY: Duration = Duration::from_secs(10);
+
+/// Seconds from which a test is said to be long.
+const LONG: f64 = 20.0;
 
 #[derive(Clone, Debug)]
 pub(crate) struct TeamOptions {
@@ -59,7 +72,8 @@ pub(crate) struct TeamOutcome {
     pub(crate) unwritten: Option<Error>,
 }
 
-/// Tests a team on images. Writes the file after every robot; the same command goes on from there.
+/// Tests a team on images, block by block. Writes the file every few seconds and when stopped; the
+/// same command goes on from there.
 pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutcome, Error> {
     let archives = options.archives.iter();
     let sources = archives
@@ -128,27 +142,27 @@ pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutco
         .collect();
     // Known members stay in the file from the beginning, in the team's order.
     let known = known(options, &file)?;
-    let mut members: Vec<Option<Member>> = robots
-        .iter()
-        .map(|chosen| {
-            let is_it = |member: &&Member| {
-                (&member.id, &member.run_sha256) == (&chosen.robot.id, &hashes[chosen.source])
-            };
-            known.iter().find(is_it).cloned()
-        })
-        .collect();
-    let before = members.iter().flatten().count();
-    let kept = if before > 0 {
-        format!(" ({before} known from before)")
-    } else {
-        String::new()
+    let walks = robots.iter().map(|chosen| {
+        let is_it = |member: &&Member| {
+            (&member.id, &member.run_sha256) == (&chosen.robot.id, &hashes[chosen.source])
+        };
+        known
+            .iter()
+            .find(is_it)
+            .map_or_else(|| vec![None; images.len()], Member::walks)
+    });
+    let mut walks: Vec<Vec<Walk>> = walks.collect();
+    let mut done = walks.iter().flatten().flatten().count() as u64;
+    let total = (robots.len() * images.len()) as u64;
+    let kept = match done {
+        0 => String::new(),
+        done => format!(" ({done} of {total} walks known from before)"),
     };
     let label = format!(
         "showing {} to {}{kept}:",
         counted(images.len(), "image", "images"),
         counted(robots.len(), "robot", "robots")
     );
-    let [total, mut done] = [robots.len(), before].map(|robots| (robots * images.len()) as u64);
     session.observer.begins(&Work {
         label,
         total,
@@ -156,34 +170,67 @@ pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutco
         unit: "rollouts",
     });
     let (pool, mut unwritten) = (session.pool()?, Unwritten::default());
-    for (place, (chosen, of_robot)) in robots.iter().zip(&splits).enumerate() {
-        if members[place].is_some() {
-            continue;
+    let members = |walks: &[Vec<Walk>]| -> Vec<Member> {
+        let of = robots.iter().zip(&splits).zip(walks);
+        of.filter_map(|((chosen, split), walks)| {
+            let trial = Trial {
+                run: &sources[chosen.source].run,
+                robot: chosen.robot,
+                split,
+                images: &images,
+                threshold: THRESHOLD,
+            };
+            Member::of(&trial, &hashes[chosen.source], walks)
+        })
+        .collect()
+    };
+    let block = BLOCK.max(PER_THREAD * pool.current_num_threads());
+    let mut written = Instant::now();
+    let mut cost = Some((Instant::now(), done));
+    let mut stopped = false;
+    'test: for block in in_turn(&images, &file.classes).chunks(block) {
+        for (chosen, walks) in robots.iter().zip(&mut walks) {
+            let missing: Vec<usize> = block
+                .iter()
+                .copied()
+                .filter(|place| walks[*place].is_none())
+                .collect();
+            if missing.is_empty() {
+                continue;
+            }
+            let shown: Vec<ImageRef> = missing.iter().map(|place| images[*place]).collect();
+            let config = &sources[chosen.source].run.config;
+            let stimuli = stimuli_of(config, &dataset, split, &shown)?;
+            let walker = HeldOutRun::new(config, control_steps(config, CYCLES), done, session)?;
+            let (displacements, ended) = walker.rollouts_so_far(chosen.robot, &stimuli);
+            done += displacements.len() as u64;
+            for (place, walk) in missing.iter().zip(displacements) {
+                walks[*place] = Some(walk);
+            }
+            if ended.is_err() {
+                stopped = true;
+                break 'test;
+            }
+            if let Some((began, before)) = cost.take() {
+                say_cost(began.elapsed(), done - before, total - done, session);
+            }
         }
-        let run = &sources[chosen.source].run;
-        let stimuli = stimuli_of(&run.config, &dataset, split, &images)?;
-        let control_steps = control_steps(&run.config, CYCLES);
-        let walker = HeldOutRun::new(&run.config, control_steps, done, session)?;
-        let Some((displacements, _)) = walker.rollouts(chosen.robot, &stimuli) else {
-            file.members = members.into_iter().flatten().collect();
-            return Ok(TeamOutcome {
-                file,
-                unwritten: unwritten.error(),
-            });
-        };
-        done += images.len() as u64;
-        let trial = Trial {
-            run,
-            robot: chosen.robot,
-            split: of_robot,
-            images: &images,
-            threshold: THRESHOLD,
-        };
-        members[place] = Some(Member::new(&trial, &hashes[chosen.source], displacements));
-        file.members = members.iter().flatten().cloned().collect();
-        unwritten.tried(write(options, &file, session), session)?;
+        if written.elapsed() >= WRITE_EVERY {
+            file.members = members(&walks);
+            unwritten.tried(write(options, &file, session), session)?;
+            written = Instant::now();
+        }
     }
-    file.members = members.into_iter().flatten().collect();
+    file.members = members(&walks);
+    if stopped {
+        if !file.members.is_empty() {
+            unwritten.tried(write(options, &file, session), session)?;
+        }
+        return Ok(TeamOutcome {
+            file,
+            unwritten: unwritten.error(),
+        });
+    }
     file.baselines =
         pool.install(|| baselines(&file, (&sources, &robots, &splits), &dataset, split))?;
     file.answers = Some(file.decided());
@@ -192,6 +239,33 @@ pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutco
         file,
         unwritten: unwritten.error(),
     })
+}
+
+/// Returns the places of images so that classes take turns: a part of the test is a test, too.
+fn in_turn(images: &[ImageRef], classes: &[u8]) -> Vec<usize> {
+    let mut seen = vec![0_usize; classes.len()];
+    let mut places: Vec<(usize, usize, usize)> = Vec::new();
+    for (place, image) in images.iter().enumerate() {
+        let class = classes
+            .iter()
+            .position(|class| *class == image.label)
+            .expect("the images are drawn from these classes");
+        places.push((seen[class], class, place));
+        seen[class] += 1;
+    }
+    places.sort_unstable();
+    places.into_iter().map(|(.., place)| place).collect()
+}
+
+/// Says how long the test will take, judged by its first walks, if that is longer than a moment.
+fn say_cost(took: Duration, walks: u64, left: u64, session: &Session) {
+    let seconds = took.as_secs_f64() * left as f64 / walks.max(1) as f64;
+    if seconds >= LONG {
+        session.observer.note(&format!(
+            "{left} walks are left, which will take about {}",
+            duration(seconds)
+        ));
+    }
 }
 
 fn same_data(first: &StoredRun, other: &StoredRun) -> Result<(), Error> {

@@ -5,13 +5,14 @@ use crate::base::error::Error;
 use crate::base::observer::Work;
 use crate::base::session::Session;
 use crate::base::statistics::wilson;
+use crate::base::stop::Stopped;
 use crate::base::text::counted;
 use crate::config::Config;
 use crate::store::eval::RobotReport;
 use crate::store::images::ImageRef;
 use crate::store::run::{Robot, RunFile};
 use crate::task::answer::{Assignment, is_correct};
-use crate::task::evaluation::fresh_rollouts;
+use crate::task::evaluation::fresh_rollouts_so_far;
 use crate::task::fitness::Group;
 use crate::task::grouping::ClassSplit;
 use crate::task::grouping::{self, Grouping};
@@ -82,6 +83,26 @@ impl<'a> HeldOutRun<'a> {
         robot: &Robot,
         stimuli: &[Grid<f64>],
     ) -> Option<(Vec<Option<f64>>, usize)> {
+        let (displacements, simulated, ended) = self.simulated(robot, stimuli);
+        ended.ok().map(|()| (displacements, simulated))
+    }
+
+    /// Acts as [`rollouts`](HeldOutRun::rollouts), but keeps the displacements under the first
+    /// images if it is stopped.
+    pub(crate) fn rollouts_so_far(
+        &self,
+        robot: &Robot,
+        stimuli: &[Grid<f64>],
+    ) -> (Vec<Option<f64>>, Result<(), Stopped>) {
+        let (displacements, _, ended) = self.simulated(robot, stimuli);
+        (displacements, ended)
+    }
+
+    fn simulated(
+        &self,
+        robot: &Robot,
+        stimuli: &[Grid<f64>],
+    ) -> (Vec<Option<f64>>, usize, Result<(), Stopped>) {
         let HeldOutRun {
             config,
             session,
@@ -100,8 +121,8 @@ impl<'a> HeldOutRun<'a> {
                 .observer
                 .progress(done.fetch_add(count, Ordering::Relaxed) + count);
         };
-        let found = self.pool.install(|| {
-            fresh_rollouts(
+        let (found, simulated, ended) = self.pool.install(|| {
+            fresh_rollouts_so_far(
                 &robot.body,
                 stimuli,
                 &[],
@@ -110,11 +131,8 @@ impl<'a> HeldOutRun<'a> {
                 session,
             )
         });
-        let (displacements, simulated) = found.ok()?;
-        Some((
-            displacements.into_iter().map(Result::ok).collect(),
-            simulated,
-        ))
+        let displacements = found.into_iter().map(Result::ok).collect();
+        (displacements, simulated, ended)
     }
 }
 

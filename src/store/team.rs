@@ -96,10 +96,17 @@ pub struct Member {
     /// The share of all images under which it moved no farther than the threshold, or was unstable.
     #[serde(deserialize_with = "ranges::share")]
     pub(crate) not_moved: f64,
-    /// The displacement under each image \[voxel lengths\]; null if unstable.
+    /// The displacement under each image \[voxel lengths\]; null if unstable, or not shown yet.
     #[serde(deserialize_with = "ranges::number")]
     pub displacements: Vec<Option<f64>>,
+    /// If the test was stopped, the places of the images that it was shown; absent: all.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) shown: Vec<usize>,
 }
+
+/// A walk: `None` if it is still to be done, else its displacement \[voxel lengths\], or `None` for
+/// an unstable one.
+pub(crate) type Walk = Option<Option<f64>>;
 
 /// The answers of a team, by both decoders.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -240,6 +247,14 @@ impl Stored for TeamFile {
                     format!("one for each of {images} images"),
                 );
             }
+            if !member.shown.is_sorted_by(|a, b| a < b)
+                || member.shown.last().is_some_and(|place| *place >= images)
+            {
+                return refuse(&of("shown"), "places of images, in order".to_string());
+            }
+            if self.answers.is_some() && !member.shown.is_empty() {
+                return refuse(&of("shown"), "none, since there are answers".to_string());
+            }
             member
                 .own
                 .validate(images)
@@ -304,6 +319,16 @@ impl Stored for TeamFile {
 }
 
 impl Member {
+    /// Returns its walks, in the images' order.
+    pub(crate) fn walks(&self) -> Vec<Walk> {
+        let is_shown =
+            |place: usize| self.shown.is_empty() || self.shown.binary_search(&place).is_ok();
+        let walks = self.displacements.iter().enumerate();
+        walks
+            .map(|(place, walk)| is_shown(place).then_some(*walk))
+            .collect()
+    }
+
     /// Returns the classes that a walk of this robot to either side votes for.
     pub(crate) fn judge(&self) -> Readout {
         let [a, b] = self.groups.clone();

@@ -314,7 +314,34 @@ fn a_test_that_was_stopped_goes_on_and_ends_with_the_same_bytes_on_any_threads()
     let said = sandbox
         .run(&format!("{TEAM} --images 6 -o parts/team.json --threads 3"))
         .ended(0, &[]);
-    assert!(said.err.contains("(1 known"), "{}", said.err);
+    assert!(
+        said.err.contains("(6 of 18 walks known"),
+        "{}",
+        said.err
+    );
+    assert!(files(&sandbox.path("whole")) == files(&sandbox.path("parts")));
+    // As if it was stopped within a block: two robots have seen some of the images.
+    let mut part: Value = serde_json::from_str(&sandbox.read("whole/team.json")).unwrap();
+    let root = part.as_object_mut().unwrap();
+    root.remove("answers");
+    root.remove("baselines");
+    let members = root["members"].as_array_mut().unwrap();
+    members.pop();
+    for (member, shown) in members.iter_mut().zip([vec![0, 2, 4, 5], vec![2]]) {
+        for place in (0..6).filter(|place| !shown.contains(place)) {
+            member["displacements"][place] = Value::Null;
+        }
+        member["shown"] = shown.into();
+    }
+    sandbox.write("parts/team.json", &part.to_string());
+    let said = sandbox
+        .run(&format!("{TEAM} --images 6 -o parts/team.json --threads 2"))
+        .ended(0, &[]);
+    assert!(
+        said.err.contains("(5 of 18 walks known"),
+        "{}",
+        said.err
+    );
     assert!(files(&sandbox.path("whole")) == files(&sandbox.path("parts")));
     // With a run more, before the others: only its robot is shown the images, and what is known of the
     // others is in the file from then on.
@@ -326,7 +353,11 @@ fn a_test_that_was_stopped_goes_on_and_ends_with_the_same_bytes_on_any_threads()
     let said = sandbox
         .run(&format!("{TEAM} --images 6 -o more/team.json"))
         .ended(0, &[]);
-    assert!(said.err.contains("(2 known"), "{}", said.err);
+    assert!(
+        said.err.contains("(12 of 18 walks known"),
+        "{}",
+        said.err
+    );
     assert!(files(&sandbox.path("whole")) == files(&sandbox.path("more")));
     // Other images are shown to all.
     let said = sandbox

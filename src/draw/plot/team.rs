@@ -301,6 +301,7 @@ mod tests {
             },
             not_moved: 0.0,
             displacements: Vec::new(),
+            shown: Vec::new(),
         };
         let said = |member: &Member| {
             let mut canvas = Canvas::new();
