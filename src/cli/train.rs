@@ -138,6 +138,18 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
     if args.pairs {
         return pairs(args, console);
     }
+    // clap does not require what --task excludes.
+    let of_pairs = [
+        ("classes", !args.classes.is_empty()),
+        ("pair", args.what.pair.is_some()),
+        ("list", args.what.list),
+        ("slurm", args.what.slurm),
+        ("status", args.what.status),
+        ("jobs", args.what.jobs.is_some()),
+    ];
+    if let Some((name, _)) = of_pairs.into_iter().find(|(_, is_given)| *is_given) {
+        return Err(Error::usage("expected with --pairs only".to_string()).about(name));
+    }
     let mut archives = args.archives.paths();
     if archives.is_empty() {
         archives.push(folder::newest_run()?);

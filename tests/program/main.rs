@@ -13,6 +13,7 @@ mod gaits;
 mod help;
 mod no_threads;
 mod output;
+mod pairs;
 mod plot;
 mod replay;
 mod report;

@@ -314,11 +314,7 @@ fn a_test_that_was_stopped_goes_on_and_ends_with_the_same_bytes_on_any_threads()
     let said = sandbox
         .run(&format!("{TEAM} --images 6 -o parts/team.json --threads 3"))
         .ended(0, &[]);
-    assert!(
-        said.err.contains("(6 of 18 walks known"),
-        "{}",
-        said.err
-    );
+    assert!(said.err.contains("(6 of 18 walks known"), "{}", said.err);
     assert!(files(&sandbox.path("whole")) == files(&sandbox.path("parts")));
     // As if it was stopped within a block: two robots have seen some of the images.
     let mut part: Value = serde_json::from_str(&sandbox.read("whole/team.json")).unwrap();
@@ -337,11 +333,7 @@ fn a_test_that_was_stopped_goes_on_and_ends_with_the_same_bytes_on_any_threads()
     let said = sandbox
         .run(&format!("{TEAM} --images 6 -o parts/team.json --threads 2"))
         .ended(0, &[]);
-    assert!(
-        said.err.contains("(5 of 18 walks known"),
-        "{}",
-        said.err
-    );
+    assert!(said.err.contains("(5 of 18 walks known"), "{}", said.err);
     assert!(files(&sandbox.path("whole")) == files(&sandbox.path("parts")));
     // With a run more, before the others: only its robot is shown the images, and what is known of the
     // others is in the file from then on.
@@ -353,11 +345,7 @@ fn a_test_that_was_stopped_goes_on_and_ends_with_the_same_bytes_on_any_threads()
     let said = sandbox
         .run(&format!("{TEAM} --images 6 -o more/team.json"))
         .ended(0, &[]);
-    assert!(
-        said.err.contains("(12 of 18 walks known"),
-        "{}",
-        said.err
-    );
+    assert!(said.err.contains("(12 of 18 walks known"), "{}", said.err);
     assert!(files(&sandbox.path("whole")) == files(&sandbox.path("more")));
     // Other images are shown to all.
     let said = sandbox
