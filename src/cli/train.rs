@@ -283,6 +283,11 @@ fn pairs(args: TrainArgs, console: &Console) -> Result<(), Error> {
         with: &with,
         number: "--pair",
     };
+    if let Some(Run::Pair(pair)) = tasks.first().map(|task| &task.run)
+        && (list || slurm)
+    {
+        warn_of_unmeasured(&pair.gaits, console)?;
+    }
     if handle_request(&what, &tasks, &command, console)? {
         return Ok(());
     }
@@ -300,6 +305,24 @@ fn pairs(args: TrainArgs, console: &Console) -> Result<(), Error> {
         "next:",
         &format!("morphcog team --archive {}", in_shell(&out)),
     );
+    Ok(())
+}
+
+/// Warns of gaits that every process would measure for itself.
+fn warn_of_unmeasured(gaits: &Gaits, console: &Console) -> Result<(), Error> {
+    for unmeasured in pairs::unmeasured(gaits, &Session::default())? {
+        let archive = match folder::full_name(&unmeasured.archive) {
+            Some(name) => quoted(&name),
+            None => in_shell(&unmeasured.archive),
+        };
+        console.warning(&format!(
+            "{} of these gaits are not measured yet; before the others start, run: morphcog response \
+             --archive {archive} --robots {} --images {} --error 0",
+            unmeasured.robots.len(),
+            quoted(&unmeasured.robots.join(",")),
+            unmeasured.rollouts
+        ));
+    }
     Ok(())
 }
 

@@ -186,38 +186,65 @@ impl PairsOptions {
     }
 }
 
-/// Measures the responses of the gaits that a pair would try and that are not known yet; they are
-/// kept beside the gaits' runs.
+/// Gaits of a run whose responses are still to be measured.
+pub(crate) struct Unmeasured {
+    pub(crate) archive: PathBuf,
+    pub(crate) robots: Vec<String>,
+    /// Rollouts that a training asks for.
+    pub(crate) rollouts: usize,
+}
+
+/// Returns the gaits that a pair would try and whose responses are not known yet.
+///
+/// # Errors
+/// Returns an error if a run has no such robots, or a key is wrong.
+pub(crate) fn unmeasured(of: &Gaits, session: &Session) -> Result<Vec<Unmeasured>, Error> {
+    let mut all = Vec::new();
+    for archive in &of.archives {
+        let source = robots::open(archive)?;
+        let config = of.config(&source)?;
+        let gaits = candidates(&source, &of.robots, &config.train, config.seed)?;
+        let known = measured(&source, &config, &probing(&source), &gaits, session);
+        let rollouts = config.train.random_images;
+        let robots: Vec<String> = gaits
+            .iter()
+            .zip(&known)
+            .filter(|(_, known)| known.len() < rollouts)
+            .map(|(gait, _)| gait.robot.id.clone())
+            .collect();
+        if !robots.is_empty() {
+            all.push(Unmeasured {
+                archive: archive.clone(),
+                robots,
+                rollouts,
+            });
+        }
+    }
+    Ok(all)
+}
+
+/// Measures the responses that a pair needs and that are not known yet; they are kept beside the
+/// gaits' runs.
 ///
 /// # Errors
 /// Returns an error if a run has no such robots, or if it was stopped.
 pub(crate) fn measure(of: &Gaits, session: &Session) -> Result<(), Error> {
-    for archive in &of.archives {
-        let source = robots::open(archive)?;
-        let config =
-            training::config_of(&source.run.config, of.groups.classes(), of.seed, &of.set)?;
-        let gaits = candidates(&source, &of.robots, &config.train, config.seed)?;
-        let known = measured(&source, &config, &probing(&source), &gaits, session);
-        let count = config.train.random_images;
-        let unknown: Vec<String> = gaits
-            .iter()
-            .zip(&known)
-            .filter(|(_, known)| known.len() < count)
-            .map(|(gait, _)| gait.robot.id.clone())
-            .collect();
-        if unknown.is_empty() {
-            continue;
-        }
+    for Unmeasured {
+        archive,
+        robots,
+        rollouts,
+    } in unmeasured(of, session)?
+    {
         let options = ResponseOptions {
-            archive: archive.clone(),
-            robots: unknown,
+            out: beside(&archive, RESPONSE_JSON),
+            archive,
+            robots,
             physical_only: false,
             task: None,
             set: Vec::new(),
-            images: count,
+            images: rollouts,
             error: 0.0,
             seed: None,
-            out: beside(archive, RESPONSE_JSON),
         };
         let found = response::measure(&options, session)?;
         if found.stopped {
@@ -228,6 +255,14 @@ pub(crate) fn measure(of: &Gaits, session: &Session) -> Result<(), Error> {
         }
     }
     Ok(())
+}
+
+impl Gaits {
+    /// Returns the config of a training with the gaits of one of the runs.
+    fn config(&self, source: &StoredRun) -> Result<Config, Error> {
+        let groups = self.groups.classes();
+        training::config_of(&source.run.config, groups, self.seed, &self.set)
+    }
 }
 
 fn probing(source: &StoredRun) -> Probing {
@@ -278,8 +313,7 @@ fn ranked(of: &Gaits, session: &Session) -> Result<Vec<Ranked>, Error> {
     let mut all = Vec::new();
     for archive in &of.archives {
         let source = robots::open(archive)?;
-        let config =
-            training::config_of(&source.run.config, of.groups.classes(), of.seed, &of.set)?;
+        let config = of.config(&source)?;
         let whereabouts = Whereabouts::given(session.data_folder()).and_of(archive);
         let dataset = whereabouts.load(&config.data, &[Split::Train])?;
         let of_run = &source.run;
