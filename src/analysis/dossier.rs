@@ -237,13 +237,14 @@ impl Team {
         images.sort_by_key(|place| file.images[*place].label);
         let (run, split) = (&runs[*first].run, file.split.split());
         let dataset = load_dataset_of(Some(&run.dataset), &run.config, whereabouts, &[split])?;
+        let names = file.names();
         let seen = |config: &Config| {
             let one = |place: &usize| {
                 let ImageRef { index, label } = file.images[*place];
                 let stimulus = stimulus_of(config, &dataset, split, index)?;
                 Ok(LabelledStimulus {
                     class: label,
-                    label: format!("{label} ({split} {index})"),
+                    label: file.images[*place].called(split, &names),
                     stimulus,
                 })
             };
@@ -317,7 +318,7 @@ fn images(
     }
     check_length(&run.config, shown.len()).map_err(without)?;
     let one = |image: &ImageRef| {
-        let label = format!("{} (train {})", image.label, image.index);
+        let label = image.called(Split::Train, dataset.class_names());
         let seen = stimulus_of(&run.config, &dataset, Split::Train, image.index);
         let seen = seen.map_err(|error| {
             error
@@ -363,6 +364,7 @@ impl Dossier {
         );
         Recording {
             judge: self.run.judge(robot),
+            names: self.run.config.class_names(),
             ..recording
         }
     }

@@ -70,8 +70,7 @@ impl<'a> Behaviour<'a> {
         let balanced =
             shares.iter().map(|(_, share)| share).sum::<f64>() / shares.len().max(1) as f64;
         let flaw = if let Some((group, _)) = shares.iter().find(|(_, share)| *share == 0.0) {
-            let classes: Vec<String> = split.classes(*group).iter().map(u8::to_string).collect();
-            let (threshold, classes) = (criteria.threshold, classes.join(", "));
+            let (threshold, classes) = (criteria.threshold, split.listed(*group));
             Some(format!(
                 "never walks more than {threshold} voxel lengths the correct way for {classes}"
             ))

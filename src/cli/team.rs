@@ -49,9 +49,10 @@ pub(super) struct TeamArgs {
     /// their beginnings, separated by commas (of all archives) [default: best].
     #[arg(short, long, visible_aliases = ["robot", "select"])]
     robots: Vec<Selection>,
-    /// Classes to tell apart, such as 0,1,2 (default: all of the dataset).
+    /// Classes to tell apart, by name or number, such as 0,1,2 (default: all of the dataset). Robots
+    /// that know others are left out.
     #[arg(long, value_delimiter = ',')]
-    classes: Vec<u8>,
+    classes: Vec<String>,
     /// Number of images in all, equally many per class; or "all": every image of the classes.
     #[arg(short = 'n', long, default_value_t = HowMany::Evenly(1000))]
     images: HowMany,

@@ -24,6 +24,7 @@ use crate::store::names::AUDIT_JSON;
 use crate::store::results::replaced;
 use crate::store::run::{Robot, RunFile};
 use crate::store::unwritten::Unwritten;
+use crate::task::class_names::ClassNames;
 use crate::task::evaluation::fresh_rollouts;
 use crate::task::fitness::Fitness;
 use crate::task::grouping::Grouping;
@@ -300,12 +301,14 @@ fn training_of(
         run.dataset.clone(),
         images.iter().map(see).collect::<Result<Vec<_>, Error>>(),
     );
+    let names = ClassNames::default();
     // As in a test, all rollouts have the same conditions, however the robot was trained.
     let conditions = Vec::new();
     Ok(TrainingImages {
         dataset,
         images,
         stimuli: stimuli?,
+        names,
         conditions,
     })
 }
@@ -473,6 +476,7 @@ mod tests {
                 dataset,
                 images,
                 stimuli,
+                names: ClassNames::default(),
                 conditions: Vec::new(),
             },
             criteria,

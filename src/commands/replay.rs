@@ -13,6 +13,7 @@ use crate::robots::published;
 use crate::robots::selection::Selection;
 use crate::store::images::{DatasetRef, ImageRef};
 use crate::task::answer::Readout;
+use crate::task::class_names::ClassNames;
 use crate::task::protocol::RolloutMode;
 use crate::task::recording::{LabelledStimulus, Recording};
 use crate::task::rollout::record;
@@ -82,6 +83,8 @@ pub(crate) struct ReplaySubject {
     pub(crate) found: FoundRobot,
     /// Images as it sees them.
     pub(crate) images: Vec<LabelledStimulus>,
+    /// Names of the images' classes.
+    pub(crate) names: ClassNames,
 }
 
 /// Records a robot's rollout under the protocol of its config.
@@ -136,11 +139,13 @@ pub(crate) fn record_subject(subject: &ReplaySubject) -> Recording {
                 ..
             },
         images,
+        names,
     } = subject;
     let fresh = config.protocol.rollout == RolloutMode::Fresh;
     let recording = record(name, body, &config.physics, &config.protocol, fresh, images);
     Recording {
         judge: judge.clone(),
+        names: names.clone(),
         ..recording
     }
 }
@@ -226,13 +231,17 @@ pub(crate) fn subject(options: &ReplayOptions) -> Result<ReplaySubject, Error> {
         let stimulus = stimulus_of(config, &dataset, split, index)?;
         images.push(LabelledStimulus {
             class: label,
-            label: format!("{label} ({split} {index})"),
+            label: ImageRef { index, label }.called(split, dataset.class_names()),
             stimulus,
         });
     }
     config.data.dataset = dataset.name().to_string();
     check_length(config, images.len())?;
-    Ok(ReplaySubject { found, images })
+    Ok(ReplaySubject {
+        found,
+        images,
+        names: dataset.class_names().clone(),
+    })
 }
 
 /// Training images to show: all, or the first of each class if they are too many.

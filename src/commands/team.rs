@@ -32,6 +32,7 @@ use crate::store::unwritten::Unwritten;
 use crate::store::validation::most_images as shown_for_validation;
 use crate::task::answer::Readout;
 use crate::task::answer::THRESHOLD;
+use crate::task::class_names::ClassNames;
 use crate::task::fitness::Group;
 use crate::task::grouping::{self};
 use rayon::prelude::*;
@@ -56,8 +57,8 @@ pub(crate) struct TeamOptions {
     pub(crate) archives: Vec<PathBuf>,
     /// Their robots. Ids are looked up in all runs together; other selections apply to each run.
     pub(crate) robots: Selection,
-    /// Classes to tell apart; `None`: all of the dataset.
-    pub(crate) classes: Option<Vec<u8>>,
+    /// Classes to tell apart, by name or number; `None`: all of the dataset.
+    pub(crate) classes: Option<Vec<String>>,
     pub(crate) images: HowMany,
     pub(crate) split: HeldOut,
     /// Seed for drawing images, and robots with `random:N`.
@@ -110,7 +111,8 @@ pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutco
         .iter()
         .map(|chosen| split_of(&sources[chosen.source], chosen));
     let splits = splits.collect::<Result<Vec<grouping::ClassSplit>, Error>>()?;
-    covered(&robots, &splits, &classes)?;
+    let (robots, splits) = within(&classes, robots, splits, session);
+    covered(&splits, &classes, dataset.class_names())?;
     let images = match options.split {
         HeldOut::Test => test_images(&classes, &dataset, options.images, options.seed)?,
         HeldOut::Validation => validation_images(options, &sources, &classes, &dataset)?,
@@ -120,6 +122,7 @@ pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutco
         format_version: FORMAT_VERSION,
         program_version: env!("CARGO_PKG_VERSION").to_string(),
         classes,
+        class_names: dataset.class_names().all().to_vec(),
         dataset: dataset.name().to_string(),
         test_sha256: dataset
             .fingerprint(Split::Test)
@@ -306,14 +309,20 @@ fn chosen<'a>(options: &TeamOptions, sources: &'a [StoredRun]) -> Result<Vec<Cho
 }
 
 fn classes(options: &TeamOptions, dataset: &Dataset) -> Result<Vec<u8>, Error> {
-    let all = dataset.classes(Split::Train);
-    let mut classes = options.classes.clone().unwrap_or_else(|| all.clone());
+    let (all, names) = (dataset.classes(Split::Train), dataset.class_names());
+    let mut classes = match &options.classes {
+        None => all.clone(),
+        Some(texts) => {
+            let read = texts.iter().map(|text| names.class(text));
+            let read = read.collect::<Result<Vec<u8>, String>>();
+            read.map_err(|text| Error::usage(text).about("classes"))?
+        }
+    };
     classes.sort_unstable();
     classes.dedup();
     if let Some(class) = classes.iter().find(|class| !all.contains(class)) {
-        return Err(
-            Error::usage(format!("{} has no class {class}", dataset.name())).about("classes"),
-        );
+        let text = format!("{} has no class {}", dataset.name(), names.name(*class));
+        return Err(Error::usage(text).about("classes"));
     }
     if classes.len() < 2 {
         return Err(Error::usage("expected two or more".to_string()).about("classes"));
@@ -350,41 +359,47 @@ fn split_of(source: &StoredRun, chosen: &Chosen) -> Result<grouping::ClassSplit,
     of_robot.ok_or_else(|| Error::input(text()).remedy(Remedy::ChooseRobots(None)))
 }
 
-/// Checks that every class has a robot, and every robot only classes of the team.
+/// Leaves out robots that know a class outside of the team's: their votes would be for none of it.
+fn within<'a>(
+    classes: &[u8],
+    robots: Vec<Chosen<'a>>,
+    splits: Vec<grouping::ClassSplit>,
+    session: &Session,
+) -> (Vec<Chosen<'a>>, Vec<grouping::ClassSplit>) {
+    let is_within = |split: &grouping::ClassSplit| {
+        let all = [Group::A, Group::B].into_iter();
+        all.flat_map(|group| split.classes(group))
+            .all(|class| classes.contains(class))
+    };
+    let all = robots.len();
+    let both = robots.into_iter().zip(splits);
+    let (robots, splits): (Vec<Chosen>, Vec<_>) =
+        both.filter(|(_, split)| is_within(split)).unzip();
+    if robots.len() < all {
+        let left_out = all - robots.len();
+        session.observer.note(&format!(
+            "left out: {} other classes",
+            counted(left_out, "robot that knows", "robots that know")
+        ));
+    }
+    (robots, splits)
+}
+
+/// Checks that every class has a robot.
 fn covered(
-    robots: &[Chosen],
     splits: &[grouping::ClassSplit],
     classes: &[u8],
+    names: &ClassNames,
 ) -> Result<(), Error> {
     let is_unknown = |class: &&u8| splits.iter().all(|split| split.group(**class).is_none());
-    let missing: Vec<String> = classes
-        .iter()
-        .filter(is_unknown)
-        .map(u8::to_string)
-        .collect();
-    if !missing.is_empty() {
-        let text = format!("no robot of the team knows class {}", missing.join(", "));
-        return Err(Error::input(text)
-            .remedy(Remedy::AddRuns)
-            .remedy(Remedy::NameClasses));
-    }
-    let is_foreign = |split: &grouping::ClassSplit| {
-        [Group::A, Group::B]
-            .into_iter()
-            .flat_map(|g| split.classes(g))
-            .any(|class| !classes.contains(class))
-    };
-    match robots
-        .iter()
-        .zip(splits)
-        .find(|(_, split)| is_foreign(split))
-    {
-        None => Ok(()),
-        Some((chosen, split)) => {
-            let (id, task) = (&chosen.robot.id, split.name());
-            let text = format!("robot {id} tells {task} apart: expected classes of the team only");
+    let missing: Vec<&u8> = classes.iter().filter(is_unknown).collect();
+    match missing.is_empty() {
+        true => Ok(()),
+        false => {
+            let missing = names.list(missing);
+            let text = format!("no robot of the team knows class {missing}");
             Err(Error::input(text)
-                .advice("leave it out")
+                .remedy(Remedy::AddRuns)
                 .remedy(Remedy::NameClasses))
         }
     }

@@ -436,7 +436,7 @@ impl Config {
         match self.data.class_names.is_empty() {
             true => Config {
                 data: DataConfig {
-                    class_names: dataset.class_names().to_vec(),
+                    class_names: dataset.class_names().all().to_vec(),
                     ..self.data
                 },
                 ..self

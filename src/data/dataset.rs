@@ -6,6 +6,7 @@ use crate::base::random::{Purpose, stream};
 pub use crate::data::builtin::BUILTIN;
 use crate::data::builtin::{BuiltinDigits, BuiltinError};
 use crate::data::catalogue::{FETCHABLE, known_as};
+use crate::data::class_names::ClassNames;
 use crate::data::description::Description;
 use crate::data::files;
 use crate::data::files::{DatasetPlace, FilesError, StoredSplit};
@@ -67,8 +68,8 @@ pub enum DatasetError {
         dataset: String,
         /// The split.
         split: Split,
-        /// The class.
-        class: u8,
+        /// The name of the class, or its number.
+        class: String,
         /// Number requested.
         wanted: usize,
         /// Number of images of the class.
@@ -96,7 +97,7 @@ pub struct Dataset {
     /// The folder with its files; none for the built-in digits.
     folder: Option<PathBuf>,
     origin: String,
-    class_names: Vec<String>,
+    class_names: ClassNames,
     splits: BTreeMap<Split, Loaded>,
 }
 
@@ -143,7 +144,7 @@ impl Dataset {
         let place = files::choose(name, given)?;
         let described = Description::read(&place.path).map_err(DatasetError::Description)?;
         let transpose = transpose.or(described.as_ref().and_then(|said| said.transpose));
-        let class_names = described.map_or_else(Vec::new, |said| said.class_names);
+        let class_names = described.map_or_else(ClassNames::default, |said| said.names());
         let mut splits = BTreeMap::new();
         for &split in wanted {
             let (labels, stored) = files::load(name, &place, split, transpose)?;
@@ -186,7 +187,7 @@ impl Dataset {
             name: BUILTIN.to_string(),
             folder: None,
             origin: BUILTIN.to_string(),
-            class_names: Vec::new(),
+            class_names: ClassNames::default(),
             splits,
         })
     }
@@ -200,9 +201,20 @@ impl Dataset {
         self.folder.as_deref()
     }
 
-    /// Returns the names of its classes, from class 0; empty if they have numbers only.
-    pub(crate) fn class_names(&self) -> &[String] {
+    pub(crate) fn class_names(&self) -> &ClassNames {
         &self.class_names
+    }
+
+    /// Calls its classes as a config does, if that names any.
+    #[must_use]
+    pub(crate) fn called(self, names: &[String]) -> Self {
+        match names.is_empty() {
+            true => self,
+            false => Dataset {
+                class_names: ClassNames::of(names),
+                ..self
+            },
+        }
     }
 
     /// Returns name, folder and the origin of that folder, for messages.
@@ -316,6 +328,7 @@ impl Dataset {
             name,
             source,
             origin,
+            class_names: self.class_names.all().to_vec(),
             splits,
         }
     }
@@ -335,6 +348,7 @@ impl Dataset {
             let all = self.indices_of(split, class);
             if all.len() < per_class {
                 let (dataset, found) = (self.name.clone(), all.len());
+                let class = self.class_names.name(class);
                 return Err(DatasetError::TooFew {
                     dataset,
                     split,
@@ -408,18 +422,12 @@ mod tests {
         assert_eq!(drawn[..100], data.draw(Split::Test, &[4], 100, 5).unwrap());
         assert_ne!(drawn, data.draw(Split::Test, &[4, 9], 100, 6).unwrap());
         let error = data.draw(Split::Test, &[4], 501, 5).unwrap_err();
-        assert!(
-            matches!(
-                error,
-                DatasetError::TooFew {
-                    class: 4,
-                    wanted: 501,
-                    found: 500,
-                    ..
-                }
-            ),
-            "{error}"
-        );
+        let expected = "builtin: 501 test images of class 4 were asked for, there are 500";
+        assert_eq!(error.to_string(), expected);
+        let mut names = vec![String::new(); 4];
+        names.push("four".to_string());
+        let error = data.called(&names).draw(Split::Test, &[4], 501, 5);
+        assert!(error.unwrap_err().to_string().contains("class four"));
     }
 
     #[test]

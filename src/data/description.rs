@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::files::{read_text, write_atomically};
+use crate::data::class_names::ClassNames;
 use serde::{Deserialize, Serialize};
 use std::io;
 use std::path::Path;
@@ -34,6 +35,10 @@ impl Description {
             class_names,
             transpose,
         }
+    }
+
+    pub(crate) fn names(&self) -> ClassNames {
+        ClassNames::of(&self.class_names)
     }
 
     /// Reads the description in a folder; `None` if there is none.

@@ -1,5 +1,6 @@
 //! Record of a dataset, by which a result can be traced to the exact images behind it.
 
+use crate::data::class_names::ClassNames;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
@@ -13,10 +14,17 @@ pub(crate) struct DatasetInfo {
     pub(crate) source: String,
     /// Origin of that folder ("as given", "MORPHCOG_DATA", `[data] dir`, "default"), or "builtin".
     pub(crate) origin: String,
+    /// Names of its classes, from class 0.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) class_names: Vec<String>,
     pub(crate) splits: BTreeMap<Split, SplitInfo>,
 }
 
 impl DatasetInfo {
+    pub(crate) fn names(&self) -> ClassNames {
+        ClassNames::of(&self.class_names)
+    }
+
     /// Lists unintended differences of training and test images: sizes, classes in one only.
     pub(crate) fn differences(&self) -> Vec<String> {
         let [Some(train), Some(test)] = Split::ALL.map(|split| self.splits.get(&split)) else {
@@ -32,14 +40,13 @@ impl DatasetInfo {
             ));
         }
         for (split, has, lacks) in [("test", train, test), ("train", test, train)] {
-            let missing: Vec<String> = (has.per_class.keys())
+            let missing: Vec<&u8> = (has.per_class.keys())
                 .filter(|class| !lacks.per_class.contains_key(class))
-                .map(u8::to_string)
                 .collect();
             if !missing.is_empty() {
                 all.push(format!(
                     "there are no {split} images of class {}",
-                    missing.join(", ")
+                    self.names().list(missing)
                 ));
             }
         }

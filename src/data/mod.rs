@@ -2,6 +2,7 @@
 
 pub(crate) mod builtin;
 pub mod catalogue;
+pub(crate) mod class_names;
 pub mod dataset;
 pub(crate) mod description;
 pub mod fetch;

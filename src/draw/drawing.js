@@ -151,5 +151,12 @@ const Drawing = (() => {
     return made;
   };
 
-  return { css, element, fit, sidesOf, ruler, robot, voxel, swatch, path, stimulus };
+  // Names of classes as class_names.rs has them: of one, of one in a sentence, and of a side; `given` begins with class 0 and may lack some, or all.
+  const classNames = (given) => {
+    const name = (label) => given?.[label] || String(label);
+    const a = (label) => given?.[label] || "a " + label;
+    return { name, a, side: (labels) => labels.map(name).join(labels.some((label) => given?.[label]) ? ", " : " ") };
+  };
+
+  return { classNames, css, element, fit, sidesOf, ruler, robot, voxel, swatch, path, stimulus };
 })();

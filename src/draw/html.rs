@@ -10,6 +10,7 @@ use crate::draw::error::{PictureError, write_whole};
 use crate::draw::gif;
 use crate::draw::walk::Walk;
 use crate::task::answer::THRESHOLD;
+use crate::task::class_names::ClassNames;
 use crate::task::recording::{Recording, VoxelCorners};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
@@ -230,7 +231,7 @@ fn moments(walk: &Walk, every: usize, unit: f64) -> (Value, Vec<i16>) {
         })
     });
     let body = &recording.body;
-    let rollout = json!({
+    let mut rollout = json!({
         "robot": recording.robot,
         "body": body.to_string(),
         "voxels": corners(body, &recording.voxels),
@@ -245,7 +246,15 @@ fn moments(walk: &Walk, every: usize, unit: f64) -> (Value, Vec<i16>) {
         "origins": BASE64.encode(bytes(origins.iter().flatten().map(|v| v.to_le_bytes()))),
         "materials": materials(),
     });
+    named(&mut rollout, &recording.names);
     (rollout, positions)
+}
+
+/// Adds the names of the classes for the pages' scripts, if there are any.
+pub(crate) fn named(object: &mut Value, names: &ClassNames) {
+    if !names.all().is_empty() {
+        object["class_names"] = names.all().into();
+    }
 }
 
 /// Describes the materials for the pages' scripts.

@@ -77,7 +77,13 @@ pub(crate) fn least_width(walk: &Walk) -> f64 {
         .flat_map(|j| [(f64::NEG_INFINITY, &j.left), (f64::INFINITY, &j.right)]);
     let verdicts = sides.map(|(moved, classes)| {
         let class = classes.first().copied().unwrap_or_default();
-        large(&answer::verdict(judge, moved, class, true))
+        large(&answer::verdict(
+            judge,
+            &recording.names,
+            moved,
+            class,
+            true,
+        ))
     });
     let words = verdicts.fold(distance.max(small(&time)), f64::max);
     MARGIN + STIMULUS + GAP + words + GAP + LEGEND + MARGIN
@@ -125,6 +131,7 @@ pub(crate) fn readout(walk: &Walk, frame: usize) -> Caption {
         displacement: format!("{arrow} {}", signed(d)),
         verdict: answer::verdict(
             walk.recording().judge.as_ref(),
+            &walk.recording().names,
             d,
             *class,
             frame + 1 >= frames.end,

@@ -60,13 +60,14 @@
     const goesOn = p + 1 < phases.length && !phases[p + 1].fresh;
     return rollout.steps[goesOn ? end(p) : end(p) - 1] - rollout.steps[phases[p].first];
   };
-  // As task/judge.rs has it.
+  const names = Drawing.classNames(rollout.class_names);
+  // As task/answer.rs has it.
   const verdict = (p, d, over) => {
     if (!rollout.judge) return "";
     const says = Math.abs(d) > rollout.threshold ? (d < 0 ? rollout.judge.left : rollout.judge.right) : [];
     if (!says.length) return over ? "undecided" : "";
     const known = over && [...rollout.judge.left, ...rollout.judge.right].includes(phases[p].class);
-    return "says " + says.join(" or ") + (known ? (says.includes(phases[p].class) ? ": correct" : ": wrong") : "");
+    return "says " + says.map(names.name).join(" or ") + (known ? (says.includes(phases[p].class) ? ": correct" : ": wrong") : "");
   };
   $("answers").hidden = $("verdict").hidden = !rollout.judge;
   const moved = (f) => origin(f, 0) - origin(phases[phaseOf(f)].first, 0);

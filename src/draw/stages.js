@@ -12,11 +12,12 @@ const Stages = (() => {
   };
 
   class Team {
-    // Members: robot, task, judge, voxels, and how many points. `materials`: areas and list, as Drawing has them.
-    constructor(stages, tally, { members, classes, threshold, materials }) {
+    // Members: robot, task, judge, voxels, and how many points. `materials`: areas and list, as Drawing has them. `given`: names of classes.
+    constructor(stages, tally, { members, classes, class_names: given, threshold, materials }) {
       Object.assign(this, { members, classes, threshold, materials });
+      const { name, side } = Drawing.classNames(given);
       this.stages = members.map(({ robot, task, judge, voxels, points }) => {
-        const canvas = element("canvas"), sides = (way) => judge[way].join(" ");
+        const canvas = element("canvas"), sides = (way) => side(judge[way]);
         const label = element("figcaption", {}, element("b", { textContent: "← " + sides("left") }), element("b", { textContent: sides("right") + " →" }));
         const figure = element("figure", { title: `${robot}: ${task}` }, canvas, label);
         figure.dataset.task = task;
@@ -25,8 +26,9 @@ const Stages = (() => {
       const least = members.length > 24 ? 84 : members.length > 8 ? 120 : 190;
       stages.style.gridTemplateColumns = `repeat(auto-fill, minmax(min(${least}px, 45%), 1fr))`;
       stages.replaceChildren(...this.stages.map((stage) => stage.figure));
-      this.bars = classes.map((label) => element("li", {}, element("b", { textContent: label }), element("i"), element("span")));
+      this.bars = classes.map((label) => element("li", {}, element("b", { textContent: name(label), title: given?.[label] ?? "" }), element("i"), element("span")));
       tally.replaceChildren(...this.bars);
+      tally.parentElement.toggleAttribute("data-named", !!given);
       const known = (label) => members.filter(({ judge }) => judge.left.concat(judge.right).includes(label)).length;
       this.most = Math.max(1, ...classes.map(known));
     }

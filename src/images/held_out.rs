@@ -11,6 +11,7 @@ use crate::images::training::TrainingImages;
 use crate::store::images::{HowMany, ImageRef};
 use crate::store::run::RunFile;
 use crate::store::training::Origin;
+use crate::task::class_names::ClassNames;
 use std::collections::BTreeSet;
 
 /// Returns the indices of all images that a run, and its gaits before, were trained on.
@@ -49,6 +50,7 @@ fn most(left: &[Vec<ImageRef>]) -> usize {
 fn per_class(
     classes: &[u8],
     left: &[Vec<ImageRef>],
+    names: &ClassNames,
     argument: Option<&'static str>,
     how_many: HowMany,
 ) -> Result<usize, Error> {
@@ -59,8 +61,9 @@ fn per_class(
     match classes.iter().zip(left).min_by_key(|(_, left)| left.len()) {
         Some((label, scarcest)) if scarcest.len() < per_class => {
             let text = format!(
-                "expected {} of class {label} that the run is not trained on, found {}",
+                "expected {} of class {} that the run is not trained on, found {}",
                 counted(per_class, "image", "images"),
+                names.name(*label),
                 scarcest.len()
             );
             let error = match argument {
@@ -96,7 +99,8 @@ pub(crate) fn check(
     seen.extend(before);
     let classes = config.classes();
     let left = unused_by_class(&classes, &seen, dataset);
-    per_class(&classes, &left, None, HowMany::Evenly(images))
+    let names = dataset.class_names();
+    per_class(&classes, &left, names, None, HowMany::Evenly(images))
         .map(|_| ())
         .map_err(|error| {
             let most = most(&left);
@@ -155,10 +159,13 @@ pub(crate) fn images_besides(
         seen.extend(trained_on(run, dataset)?);
     }
     let left = unused_by_class(classes, &seen, dataset);
+    let names = dataset.class_names();
     let per_class =
-        per_class(classes, &left, argument, how_many).map_err(|error| match most(&left) {
-            0 => error.advice("every image of that class was trained on; show test images"),
-            most => error.advice(format!("ask for at most {most}")),
+        per_class(classes, &left, names, argument, how_many).map_err(|error| {
+            match most(&left) {
+                0 => error.advice("every image of that class was trained on; show test images"),
+                most => error.advice(format!("ask for at most {most}")),
+            }
         })?;
     let HowMany::Evenly(count) = how_many else {
         return Ok(left.concat());
@@ -189,12 +196,14 @@ pub(crate) fn test_images(
 ) -> Result<Vec<ImageRef>, Error> {
     let count_of = |class: &&u8| dataset.indices_of(Split::Test, **class).len();
     if let Some(label) = classes.iter().find(|class| count_of(class) == 0) {
+        let names = dataset.class_names();
         let text = format!(
-            "{}: there is no test image of class {label}",
-            dataset.name()
+            "{}: there is no test image of class {}",
+            dataset.name(),
+            names.name(*label)
         );
-        let there = dataset.classes(Split::Test);
-        return Err(Error::input(text).advice(format!("there are of the classes {there:?}")));
+        let there = names.list(&dataset.classes(Split::Test));
+        return Err(Error::input(text).advice(format!("there are of the classes [{there}]")));
     }
     let HowMany::Evenly(count) = how_many else {
         let of_class = |&label: &u8| {

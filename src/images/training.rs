@@ -8,6 +8,7 @@ use crate::data::dataset::{Dataset, DatasetError, Split};
 use crate::images::whereabouts::{load_dataset, stimulus_of};
 use crate::store::images::{DatasetRef, ImageRef, answers};
 use crate::task::answer::Answer;
+use crate::task::class_names::ClassNames;
 use crate::task::perturbation::Condition;
 use std::path::Path;
 
@@ -20,8 +21,16 @@ pub struct TrainingImages {
     /// Stimuli, H × W in [0, 1]: the images as the sensors see them or, where a response is
     /// measured, as many made from their pixels.
     pub stimuli: Vec<Grid<f64>>,
+    /// Names of the classes.
+    pub(crate) names: ClassNames,
     /// Condition of each stimulus in a fresh rollout; the default where one is missing.
     pub conditions: Vec<Condition>,
+}
+
+/// Says which classes the training images have.
+fn has(dataset: &Dataset) -> String {
+    let there = dataset.class_names().list(&dataset.classes(Split::Train));
+    format!("{} has the classes [{there}]", dataset.name())
 }
 
 /// Returns the number of training images of the scarcest class; an error if below `least`.
@@ -31,12 +40,10 @@ pub(crate) fn scarcest(dataset: &Dataset, classes: &[u8], least: usize) -> Resul
         .map(|class| (dataset.indices_of(Split::Train, *class).len(), *class));
     match counts.min() {
         Some((count, class)) if count < least => {
+            let class = dataset.class_names().name(class);
             let text =
                 format!("class {class}: expected {least} training images or more, found {count}");
-            let there = dataset.classes(Split::Train);
-            Err(Error::input(text)
-                .about("task")
-                .advice(format!("{} has the classes {there:?}", dataset.name())))
+            Err(Error::input(text).about("task").advice(has(dataset)))
         }
         scarcest => Ok(scarcest.map_or(0, |(count, _)| count)),
     }
@@ -67,9 +74,7 @@ impl TrainingImages {
                     config.seed,
                 )
                 .map_err(|error| {
-                    let there = dataset.classes(Split::Train);
-                    Error::input(format!("data.images_per_class: {error}"))
-                        .advice(format!("{} has the classes {there:?}", dataset.name()))
+                    Error::input(format!("data.images_per_class: {error}")).advice(has(dataset))
                 }),
         }
     }
@@ -77,13 +82,17 @@ impl TrainingImages {
     /// Returns the training images of a config, at least one of each class of its task.
     pub(crate) fn images(config: &Config, dataset: &Dataset) -> Result<Vec<ImageRef>, Error> {
         let refuse = |error: DatasetError| Error::input(format!("data.train_images: {error}"));
-        let classes = config.classes();
+        let (classes, names) = (config.classes(), dataset.class_names());
         let mut images = Vec::new();
         for index in TrainingImages::indices(config, dataset)? {
             let label = dataset.label(Split::Train, index).map_err(refuse)?;
             if !classes.contains(&label) {
+                let what = names
+                    .given(label)
+                    .map_or(format!("a {label}"), str::to_string);
+                let expected = names.list(&classes);
                 let text = format!(
-                    "data.train_images: image {index} shows a {label}, expected one of {classes:?}"
+                    "data.train_images: image {index} shows {what}, expected one of [{expected}]"
                 );
                 return Err(Error::input(text).remedy(Remedy::DrawTrainingImages));
             }
@@ -94,8 +103,10 @@ impl TrainingImages {
             .find(|&&class| images.iter().all(|image| image.label != class))
         {
             Some(class) => {
-                let text =
-                    format!("data.train_images: expected an image of class {class}, found none");
+                let text = format!(
+                    "data.train_images: expected an image of class {}, found none",
+                    names.name(*class)
+                );
                 Err(Error::input(text).remedy(Remedy::DrawTrainingImages))
             }
             None => Ok(images),
@@ -113,6 +124,7 @@ impl TrainingImages {
         let train_sha256 = dataset
             .fingerprint(Split::Train)
             .expect("its images were read just now");
+        let names = dataset.class_names().clone();
         let dataset = DatasetRef {
             name: dataset.name().to_string(),
             train_sha256,
@@ -125,6 +137,7 @@ impl TrainingImages {
             dataset,
             images,
             stimuli,
+            names,
             conditions,
         })
     }
@@ -138,7 +151,7 @@ impl TrainingImages {
             classes.dedup();
             return format!("{} images of {} classes", self.images.len(), classes.len());
         }
-        let image = |image: &ImageRef| format!("{} (train {})", image.label, image.index);
+        let image = |image: &ImageRef| image.called(Split::Train, &self.names);
         self.images.iter().map(image).collect::<Vec<_>>().join(", ")
     }
 

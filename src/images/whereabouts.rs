@@ -87,9 +87,7 @@ impl Whereabouts {
         let (given, _) = self.places(config)?;
         let place = files::choose(&config.dataset, &given).map_err(DatasetError::from)?;
         let described = Description::read(&place.path)?;
-        Ok(described.map_or_else(ClassNames::default, |said| {
-            ClassNames::of(&said.class_names)
-        }))
+        Ok(described.map_or_else(ClassNames::default, |said| said.names()))
     }
 
     /// Returns the folders to look in, and the one that a run remembers if it is gone.
@@ -111,25 +109,27 @@ impl Whereabouts {
         Ok((given, gone))
     }
 
-    /// Loads the dataset of a section `[data]`.
+    /// Loads the dataset of a section `[data]`; its classes have the config's names, or else the
+    /// dataset's own.
     ///
     /// # Errors
     /// The error says what is missing or broken, where it was looked for, and what to do.
     pub fn load(&self, config: &DataConfig, wanted: &[Split]) -> Result<Dataset, Error> {
         if config.dataset == BUILTIN {
-            return Dataset::builtin(config.builtin.clone(), wanted).map_err(Error::from);
+            let digits = Dataset::builtin(config.builtin.clone(), wanted)?;
+            return Ok(digits.called(&config.class_names));
         }
         let (given, gone) = self.places(config)?;
-        Dataset::oriented(&config.dataset, &given, wanted, config.transpose).map_err(|error| {
-            match gone {
-                Some(gone) => Error::from(error)
-                    .advice(format!(
-                        "the images of this run were in {gone}, which is not there any more"
-                    ))
-                    .remedy(Remedy::NameData),
-                None => Error::from(error),
-            }
-        })
+        let loaded = Dataset::oriented(&config.dataset, &given, wanted, config.transpose);
+        let loaded = loaded.map_err(|error| match gone {
+            Some(gone) => Error::from(error)
+                .advice(format!(
+                    "the images of this run were in {gone}, which is not there any more"
+                ))
+                .remedy(Remedy::NameData),
+            None => Error::from(error),
+        })?;
+        Ok(loaded.called(&config.class_names))
     }
 
     /// Loads the dataset whose training images have this SHA-256, since indices mean other images

@@ -14,6 +14,7 @@ use crate::store::images::DatasetRef;
 use crate::store::names::RUN_JSON;
 use crate::store::run::{Robot, RunFile};
 use crate::task::answer::Readout;
+use crate::task::class_names::ClassNames;
 use crate::task::protocol::Protocol;
 use crate::task::stimulus::StimulusParams;
 use serde::Serialize;
@@ -72,6 +73,8 @@ pub(crate) struct Who {
     pub(crate) encoding: StimulusParams,
     /// The judge of its walks; `None` for a body without a task.
     pub(crate) judge: Option<Readout>,
+    /// Names of the classes.
+    pub(crate) names: ClassNames,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -396,6 +399,7 @@ impl Collection {
             protocol: config.protocol.clone(),
             encoding: robot.encoding,
             judge: robot.judge.clone(),
+            names: self.config.class_names(),
         })
     }
 }

@@ -34,6 +34,9 @@ pub(crate) struct SetSummary {
     pub(crate) name: String,
     /// The number of test images by class.
     pub(crate) classes: Vec<(u8, usize)>,
+    /// The names of the classes, from class 0.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) class_names: Vec<String>,
 }
 
 /// The test images that the page offers.
@@ -102,6 +105,7 @@ impl ImageSets {
             .map(|set| SetSummary {
                 name: set.name().to_string(),
                 classes: classes(set),
+                class_names: set.class_names().all().to_vec(),
             })
             .collect()
     }

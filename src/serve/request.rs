@@ -6,6 +6,7 @@ use crate::serve::catalogue::{RobotCatalogue, Who};
 use crate::serve::images::{ImageName, ImageSets};
 use crate::serve::refusal::HttpRefusal;
 use crate::sim::Physics;
+use crate::task::class_names::ClassNames;
 use crate::task::protocol::Protocol;
 use crate::task::stimulus::{Encoding, Reduction, StimulusParams, stimulus};
 use serde::Deserialize;
@@ -141,6 +142,7 @@ impl SubjectRequest {
                     protocol,
                     encoding,
                     judge: None,
+                    names: ClassNames::default(),
                 })
             }
             _ => {

@@ -1,7 +1,7 @@
 //! Dispatches requests to their answers.
 
 use crate::body::Body;
-use crate::draw::html::materials;
+use crate::draw::html::{materials, named};
 use crate::serve::assets::asset;
 use crate::serve::http::{HttpResponse, Request};
 use crate::serve::refusal::HttpRefusal;
@@ -90,11 +90,12 @@ pub(crate) fn reply(service: &Service, request: &Request) -> Reply {
             )
         }
         ["api", "team"] => reading(&|| {
-            let members = team::members(&service.catalogue.collections());
+            let collections = service.catalogue.collections();
+            let members = team::members(&collections);
             let classes = team::classes(members.iter().map(|member| &member.judge));
-            Ok(HttpResponse::json(
-                &json!({ "members": members, "classes": classes }),
-            ))
+            let mut words = json!({ "members": members, "classes": classes });
+            named(&mut words, &team::class_names(&members, &collections));
+            Ok(HttpResponse::json(&words))
         }),
         ["api", "simulations"] => Reply::Whole(HttpResponse::wrong_method("POST")),
         ["api", "simulations", id] => posting(&|| change(service, id, &request.body)),
@@ -125,14 +126,16 @@ fn number<T: std::str::FromStr>(text: &str, what: &str) -> Result<T, HttpRefusal
 
 fn archive(service: &Service, index: &str) -> Result<HttpResponse, HttpRefusal> {
     let collection = service.catalogue.collection(number(index, "archive")?)?;
-    Ok(HttpResponse::json(&json!({
+    let mut words = json!({
         "name": collection.name,
         "bins": collection.bins,
         "tasks": collection.tasks,
         "control_steps": collection.config.protocol.control_steps,
         "dataset": collection.config.data.dataset,
         "robots": collection.robots,
-    })))
+    });
+    named(&mut words, &collection.config.class_names());
+    Ok(HttpResponse::json(&words))
 }
 
 fn images(service: &Service, request: &Request) -> Result<HttpResponse, HttpRefusal> {

@@ -205,6 +205,7 @@ mod tests {
     use crate::serve::catalogue::Who;
     use crate::serve::simulations::Simulations;
     use crate::sim::Physics;
+    use crate::task::class_names::ClassNames;
     use crate::task::protocol::Protocol;
     use crate::task::stimulus::StimulusParams;
 
@@ -220,6 +221,7 @@ mod tests {
             protocol: Protocol::default(),
             encoding: StimulusParams::default(),
             judge: None,
+            names: ClassNames::default(),
         };
         let seen = SeenPixels {
             stimulus: Grid::filled(2, 4, 0.0),

@@ -3,7 +3,7 @@
 //! As in the page of a replay, positions are in steps of 1/200 voxel length from an origin per
 //! moment, near the centre of mass.
 
-use crate::draw::html::{STEPS, corners, quantised};
+use crate::draw::html::{STEPS, corners, named, quantised};
 use crate::serve::catalogue::Who;
 use crate::serve::request::{RolloutPlan, SeenPixels};
 use crate::serve::simulation::{Event, STEPS_PER_SECOND};
@@ -67,10 +67,11 @@ pub(crate) fn of_team(event: &TeamEvent) -> String {
             };
             let members: Vec<Value> = plan.members.iter().zip(stands).map(member).collect();
             let seen = looks(0, plan.control_steps, &plan.together);
-            let words = json!({
+            let mut words = json!({
                 "id": id, "unit": STEPS, "rate": STEPS_PER_SECOND, "threshold": THRESHOLD, "until": plan.control_steps,
                 "classes": classes, "seen": seen, "members": members,
             });
+            named(&mut words, &plan.members[0].1.names);
             ("begin", words)
         }
         TeamEvent::Moment {
@@ -97,7 +98,7 @@ pub(crate) fn of_team(event: &TeamEvent) -> String {
 
 fn begin(id: u64, plan: &RolloutPlan, voxels: &[VoxelCorners], frame: &Frame) -> Value {
     let body = &plan.who.body;
-    json!({
+    let mut words = json!({
         "id": id,
         "body": body.to_string(),
         "voxels": corners(body, voxels),
@@ -109,7 +110,9 @@ fn begin(id: u64, plan: &RolloutPlan, voxels: &[VoxelCorners], frame: &Frame) ->
         "judge": plan.who.judge,
         "frames": positions(std::slice::from_ref(frame)),
         "seen": looks(0, plan.who.protocol.control_steps, &plan.seen),
-    })
+    });
+    named(&mut words, &plan.who.names);
+    words
 }
 
 fn looks(step: u32, until: u32, seen: &SeenPixels) -> Value {

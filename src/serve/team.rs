@@ -10,6 +10,7 @@ use crate::serve::simulations::Slot;
 use crate::sim::{StepError, System};
 use crate::task::answer::Readout;
 use crate::task::answer::THRESHOLD;
+use crate::task::class_names::ClassNames;
 use crate::task::recording::{Frame, VoxelCorners};
 use crate::task::rollout::Rollout;
 use crate::task::stimulus::StimulusParams;
@@ -99,6 +100,13 @@ pub(crate) fn classes<'a>(judges: impl IntoIterator<Item = &'a Readout>) -> Vec<
         .copied()
         .collect();
     all.into_iter().collect()
+}
+
+/// Returns the names of a team's classes: its members share a dataset.
+pub(crate) fn class_names(members: &[Name], collections: &[Arc<Collection>]) -> ClassNames {
+    members.first().map_or_else(ClassNames::default, |first| {
+        collections[first.archive].config.class_names()
+    })
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -313,6 +321,7 @@ mod tests {
                 },
                 encoding: StimulusParams::default(),
                 judge: Some(judge.clone()),
+                names: ClassNames::default(),
             };
             let seen = SeenPixels {
                 stimulus: Grid::filled(who.body.height(), who.body.width(), 1.0),

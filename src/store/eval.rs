@@ -6,7 +6,7 @@ use crate::base::hash::sha256_hex;
 use crate::base::ranges;
 use crate::base::remedy::{Invocation, Remedy};
 use crate::base::table;
-use crate::config::Config;
+use crate::config::{Config, DataConfig};
 use crate::data::dataset;
 use crate::data::dataset::Dataset;
 use crate::store::images::{DatasetRef, HeldOut, ImageRef};
@@ -16,6 +16,7 @@ use crate::store::setting::{RunRef, RunSetting};
 use crate::store::stored_run::StoredRun;
 use crate::store::validation::Validated;
 use crate::task::answer::Direction;
+use crate::task::class_names::ClassNames;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -334,7 +335,10 @@ impl EvalFile {
                 .fingerprint(dataset::Split::Train)
                 .expect("an evaluation loads both splits");
             let train_sha256 = replace(&mut setting.train_sha256, train_sha256);
-            let shown = setting.data.of(name);
+            let shown = DataConfig {
+                class_names: dataset.class_names().all().to_vec(),
+                ..setting.data.of(name)
+            };
             let own = replace(&mut setting.data, shown).dataset;
             self.trained_on = Some(DatasetRef {
                 name: own,
@@ -343,10 +347,26 @@ impl EvalFile {
         }
     }
 
-    /// Returns the file without results.
+    /// Returns the names of the images' classes, as far as they are known.
+    pub(crate) fn names(&self) -> ClassNames {
+        let setting = self.setting.as_ref();
+        setting.map_or_else(ClassNames::default, |setting| {
+            ClassNames::of(&setting.data.class_names)
+        })
+    }
+
+    /// Returns the file without results, and without names of classes, on which none depends.
     pub(crate) fn head(&self) -> Self {
+        let nameless = |setting: RunSetting| RunSetting {
+            data: DataConfig {
+                class_names: Vec::new(),
+                ..setting.data
+            },
+            ..setting
+        };
         EvalFile {
             stopped: false,
+            setting: self.setting.clone().map(nameless),
             baselines: BTreeMap::new(),
             means: BTreeMap::new(),
             robots: Vec::new(),

@@ -2,6 +2,7 @@
 
 use crate::data::dataset::Split;
 use crate::task::answer::Answer;
+use crate::task::class_names::ClassNames;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::borrow::Cow;
@@ -15,6 +16,13 @@ pub struct ImageRef {
     pub index: usize,
     /// The class.
     pub label: u8,
+}
+
+impl ImageRef {
+    /// Returns its class and place for people, such as "0 (train 1)" or "cat (test 7)".
+    pub(crate) fn called(self, split: Split, names: &ClassNames) -> String {
+        format!("{} ({split} {})", names.name(self.label), self.index)
+    }
 }
 
 /// The data of a run, identified by content wherever the files were.

@@ -4,10 +4,12 @@ use crate::base::error::Error;
 use crate::base::ranges;
 use crate::base::table;
 use crate::body::Body;
+use crate::data::description::check_names;
 use crate::store::images::{HeldOut, ImageRef};
 use crate::store::results::{self, Stored, write_with_table};
 use crate::task::answer::Direction;
 use crate::task::answer::Readout;
+use crate::task::class_names::ClassNames;
 use crate::task::protocol::MAX_STEPS;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -43,6 +45,10 @@ pub struct TeamFile {
     pub(crate) program_version: String,
     /// The classes to tell apart, in order.
     pub classes: Vec<u8>,
+    /// The names of the dataset's classes, from class 0; a class without one is called by its
+    /// number. Absent if none has a name.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) class_names: Vec<String>,
     /// The name of the dataset.
     pub(crate) dataset: String,
     /// The SHA-256 of its test split.
@@ -204,6 +210,7 @@ impl Stored for TeamFile {
         if classes < 2 || different != self.classes {
             return refuse("classes", "two or more, each once, in order".to_string());
         }
+        check_names(&self.class_names).map_err(|text| Error::at_key("class_names", text))?;
         if let Some(image) = self
             .images
             .iter()
@@ -341,6 +348,10 @@ impl Member {
 }
 
 impl TeamFile {
+    pub(crate) fn names(&self) -> ClassNames {
+        ClassNames::of(&self.class_names)
+    }
+
     /// Reads a team.json.
     ///
     /// # Errors

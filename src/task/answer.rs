@@ -1,6 +1,7 @@
 //! The answers of robots: the way one walks ([`Direction`]), the way it should ([`Assignment`]),
 //! and the classes that a walk names ([`Readout`]) (paper, section "Generalization test").
 
+use crate::task::class_names::ClassNames;
 use crate::task::fitness::Fitness;
 use crate::task::fitness::Group;
 use crate::task::grouping::ClassSplit;
@@ -182,14 +183,20 @@ pub(crate) fn answer(readout: Option<&Readout>, moved: f64) -> Reading {
 /// Returns the answer in words: "says 0", "says 1 or 2", or nothing while it names no class. With
 /// `over`, the walk has ended: "says 0: correct" or "says 0: wrong" if the image's `class` is one
 /// of the task's, and "undecided" if it names no class. Empty without a judge.
-pub(crate) fn verdict(readout: Option<&Readout>, moved: f64, class: u8, over: bool) -> String {
+pub(crate) fn verdict(
+    readout: Option<&Readout>,
+    names: &ClassNames,
+    moved: f64,
+    class: u8,
+    over: bool,
+) -> String {
     let Some(readout) = readout else {
         return String::new();
     };
     let says = answer(Some(readout), moved).says;
     let classes = says
         .iter()
-        .map(u8::to_string)
+        .map(|class| names.name(*class))
         .collect::<Vec<_>>()
         .join(" or ");
     let is_known = readout.left.contains(&class) || readout.right.contains(&class);
@@ -272,7 +279,8 @@ mod tests {
             (answer(None, -8.0).says, answer(None, -8.0).way),
             (vec![], Some("left"))
         );
-        let words = |moved, class, over| verdict(readout.as_ref(), moved, class, over);
+        let none = ClassNames::default();
+        let words = |moved, class, over| verdict(readout.as_ref(), &none, moved, class, over);
         assert_eq!(
             [
                 words(5.0, 0, false),
@@ -289,9 +297,14 @@ mod tests {
             [
                 words(2.0, 0, false),
                 words(2.0, 0, true),
-                verdict(None, 9.0, 0, true)
+                verdict(None, &none, 9.0, 0, true)
             ],
             ["", "undecided", ""]
+        );
+        let names = ClassNames::of(&["circle", "square"].map(String::from));
+        assert_eq!(
+            verdict(readout.as_ref(), &names, -5.0, 2, true),
+            "says square or 2: correct"
         );
         let all = Grouping::all_splits(&[0, 1], true).unwrap();
         assert_eq!(

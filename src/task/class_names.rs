@@ -1,37 +1,12 @@
-//! [`ClassNames`]: names of classes, as people read and write them.
+//! [`ClassNames`] in the names of tasks: two groups of classes, as people read and write them.
 
-use crate::task::grouping::{Groups, groups_text};
-use std::sync::Arc;
+pub(crate) use crate::data::class_names::ClassNames;
+use crate::task::grouping::{GroupingError, Groups, groups_text};
 
 /// Longest name of a class in the name of a folder, characters.
 const LONGEST: usize = 24;
 
-/// The names of a dataset's classes, from class 0. A class without a name is called by its number.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct ClassNames(Arc<[String]>);
-
 impl ClassNames {
-    pub(crate) fn of(names: &[String]) -> Self {
-        ClassNames(names.into())
-    }
-
-    fn given(&self, class: u8) -> Option<&str> {
-        let name = self.0.get(usize::from(class)).map(String::as_str);
-        name.filter(|name| !name.is_empty())
-    }
-
-    /// Returns the name of a class, or its number.
-    pub(crate) fn name(&self, class: u8) -> String {
-        self.given(class)
-            .map_or_else(|| class.to_string(), str::to_string)
-    }
-
-    /// Returns the names of classes, joined by commas, for messages.
-    pub(crate) fn list<'a>(&self, classes: impl IntoIterator<Item = &'a u8>) -> String {
-        let names: Vec<String> = classes.into_iter().map(|class| self.name(*class)).collect();
-        names.join(", ")
-    }
-
     /// Returns the name of two groups: `cat|dog,wolf`, or without names as [`groups_text`].
     pub(crate) fn groups(&self, groups: [&[u8]; 2]) -> String {
         if !groups
@@ -69,37 +44,12 @@ impl ClassNames {
         }
     }
 
-    /// Returns the class with a name, or with a number if it has no name.
-    ///
-    /// # Errors
-    /// Returns a text that lists the names.
-    pub(crate) fn class(&self, text: &str) -> Result<u8, String> {
-        let text = text.trim();
-        let by_name = self.0.iter().position(|name| name == text);
-        let number = || {
-            text.parse()
-                .ok()
-                .filter(|class: &u8| text == class.to_string())
-        };
-        by_name
-            .filter(|_| !text.is_empty())
-            .and_then(|class| u8::try_from(class).ok())
-            .or_else(number)
-            .ok_or_else(|| {
-                let names: Vec<&str> = self.0.iter().map(String::as_str).collect();
-                match names.is_empty() {
-                    true => format!("{text}: expected the number of a class, 0 to 255"),
-                    false => format!("{text}: expected one of the classes {}", names.join(", ")),
-                }
-            })
-    }
-
     /// Reads two groups: names, as in `cat|dog,wolf`, or numbers in their own grammar.
     ///
     /// # Errors
     /// Returns a text that says what was expected.
     pub(crate) fn read(&self, text: &str) -> Result<Groups, String> {
-        let is_named = self.0.iter().any(|name| !name.is_empty());
+        let is_named = self.all().iter().any(|name| !name.is_empty());
         let has_letters = !text.chars().all(|c| "0123456789|, ".contains(c));
         let groups = if is_named {
             self.read_names(text)
@@ -120,7 +70,13 @@ impl ClassNames {
         let (a, b) = text
             .split_once('|')
             .ok_or_else(|| format!("{text}: expected two groups of classes, as in cat|dog"))?;
-        Groups::of([of(a)?, of(b)?]).map_err(|error| format!("{text}: {error}"))
+        let refused = |error| match error {
+            GroupingError::Repeated(class) => {
+                format!("{text}: {} occurs more than once", self.name(class))
+            }
+            error => format!("{text}: {error}"),
+        };
+        Groups::of([of(a)?, of(b)?]).map_err(refused)
     }
 }
 
@@ -169,7 +125,8 @@ mod tests {
             error.contains("cow") && error.contains("guinea pig"),
             "{error}"
         );
-        assert!(names().read("cat|cat").is_err());
+        let error = names().read("dog|dog").unwrap_err();
+        assert_eq!(error, "dog|dog: dog occurs more than once");
         assert!(names().read("cat").is_err());
         assert!(names().read("cat|").is_err());
         assert!(ClassNames::default().read("cat|dog").is_err());

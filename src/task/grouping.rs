@@ -49,6 +49,11 @@ impl ClassSplit {
         self.b.is_empty()
     }
 
+    /// Returns the names of a group's classes, joined by commas.
+    pub(crate) fn listed(&self, group: Group) -> String {
+        self.names.list(self.classes(group))
+    }
+
     /// Returns its name, such as `0|123`, `10,11|12`, `cat|dog` or `same way`.
     pub fn name(&self) -> String {
         if self.is_same_way() {
@@ -142,7 +147,8 @@ impl Groups {
             numbers[place].map_or(self.classes[place].clone(), |number| vec![number])
         };
         Err(Ambiguous {
-            text: self.to_string(),
+            // Its grammar is that of numbers, whatever the classes are called.
+            text: groups_text([a, b], "|"),
             class,
             lone: groups_text([&lone(0), &lone(1)], "|"),
             separate: joined([a, b], "|", ","),

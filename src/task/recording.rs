@@ -3,6 +3,7 @@
 use crate::base::Grid;
 use crate::body::Body;
 use crate::task::answer::Readout;
+use crate::task::class_names::ClassNames;
 
 /// An image and its stimulus.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,4 +66,6 @@ pub struct Recording {
     pub(crate) unstable: bool,
     /// Meaning of the robot's walks; none for a robot without a task.
     pub(crate) judge: Option<Readout>,
+    /// Names of the classes.
+    pub(crate) names: ClassNames,
 }

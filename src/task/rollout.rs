@@ -4,6 +4,7 @@ use crate::base::Grid;
 use crate::base::stop::Stopped;
 use crate::body::Body;
 use crate::sim::{Energy, Physics, Start, StepError, System, Unstable, World, Worlds};
+use crate::task::class_names::ClassNames;
 use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::recording::{Frame, LabelledStimulus, Phase, Recording, VoxelCorners};
 use std::sync::Arc;
@@ -241,6 +242,7 @@ pub fn record(
         cycle: physics.cycle_steps as usize,
         unstable: false,
         judge: None,
+        names: ClassNames::default(),
     };
     for (index, seen) in images.iter().enumerate() {
         if fresh || index == 0 {

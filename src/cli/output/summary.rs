@@ -24,6 +24,7 @@ use crate::store::eval::{EvalFile, RobotReport};
 use crate::store::images::{HeldOut, ImageRef};
 use crate::store::names::RUN_JSON;
 use crate::store::validation::Validated;
+use crate::task::class_names::ClassNames;
 use std::path::Path;
 
 /// The number of robots listed after an evolution.
@@ -44,6 +45,7 @@ pub(crate) fn evolution(console: &Console, finished: &EvolveOutcome, out: &Path,
         });
         return console.event("finished", &done);
     }
+    let class_names = run.config.class_names();
     let mut robots: Vec<_> = run.elites.iter().collect();
     robots.sort_by(|a, b| b.objective.total_cmp(&a.objective));
     let rows = robots.iter().take(SHOWN).map(|robot| {
@@ -52,7 +54,7 @@ pub(crate) fn evolution(console: &Console, finished: &EvolveOutcome, out: &Path,
             robot.id.clone(),
             robot.task.clone(),
             number::fixed(robot.objective, 2),
-            walks(&run.training_images, &robot.displacements),
+            walks(&run.training_images, &robot.displacements, &class_names),
             kinds.muscle.to_string(),
             kinds.sensor.to_string(),
             kinds.total.to_string(),
@@ -214,10 +216,10 @@ pub(crate) fn evaluation(
         });
         return console.event("evaluated", &done);
     }
-    let classes: Vec<u8> = report.robots[0].per_class.keys().copied().collect();
+    let class_names = report.names();
+    let classes = report.robots[0].per_class.keys();
     let names: Vec<String> = classes
-        .iter()
-        .map(|class| format!("% of {class}"))
+        .map(|class| format!("% of {}", class_names.name(*class)))
         .collect();
     let mut headers = vec![
         "robot",
@@ -426,7 +428,7 @@ pub(crate) fn dataset(console: &Console, found: &FoundDataset) {
     if info.splits.values().any(|split| split.transposed) {
         console.line("its files are EMNIST's, mirrored and turned: its images are transposed");
     }
-    let mut rows = Vec::new();
+    let (mut rows, class_names) = (Vec::new(), info.names());
     for (split, images) in &info.splits {
         console.line(&format!(
             "{split}: {} images of {} × {}, SHA-256 {}",
@@ -443,11 +445,13 @@ pub(crate) fn dataset(console: &Console, found: &FoundDataset) {
                 file.name, file.bytes, file.sha256
             ));
         }
-        rows.extend(
-            images.per_class.iter().map(|(class, count)| {
-                vec![split.to_string(), class.to_string(), count.to_string()]
-            }),
-        );
+        rows.extend(images.per_class.iter().map(|(class, count)| {
+            vec![
+                split.to_string(),
+                class_names.name(*class),
+                count.to_string(),
+            ]
+        }));
     }
     console.table(&["split", "class", "images"], &rows);
     for (split, known) in &found.others {
@@ -465,12 +469,12 @@ pub(crate) fn dataset(console: &Console, found: &FoundDataset) {
 }
 
 /// Formats displacements by class for people: one by one if they are few, else the class means.
-fn walks(images: &[ImageRef], displacements: &[f64]) -> String {
+fn walks(images: &[ImageRef], displacements: &[f64], names: &ClassNames) -> String {
     const FEW: usize = 8;
     let shown = images.iter().zip(displacements);
     if images.len() <= FEW {
         return shown
-            .map(|(image, d)| format!("{}: {}", image.label, number::signed(*d, 1)))
+            .map(|(image, d)| format!("{}: {}", names.name(image.label), number::signed(*d, 1)))
             .collect::<Vec<_>>()
             .join("  ");
     }
@@ -480,6 +484,7 @@ fn walks(images: &[ImageRef], displacements: &[f64]) -> String {
         (*sum, *count) = (*sum + displacement, *count + 1.0);
     }
     let mean = |(class, (sum, count)): (u8, (f64, f64))| {
+        let class = names.name(class);
         format!("{class}: mean {}", number::signed(sum / count, 1))
     };
     classes.into_iter().map(mean).collect::<Vec<_>>().join("  ")

@@ -29,12 +29,15 @@ pub(crate) fn team(console: &Console, file: &TeamFile, out: Option<&Path>) -> Re
             serde_json::json!({ "votes": short(&all.votes), "walks": short(&all.walks), "ties": all.ties,
                 "agreement": all.agreement, "not_moved": all.not_moved })
         });
-        let done = serde_json::json!({
+        let mut done = serde_json::json!({
             "file": out.map(|out| out.display().to_string()), "stopped": file.answers.is_none(),
             "images": file.images.len(), "split": file.split, "classes": file.classes,
             "answers": answers, "baselines": file.baselines,
             "members": file.members.iter().map(without).collect::<Vec<_>>(), "pictures": pictures,
         });
+        if !file.class_names.is_empty() {
+            done["class_names"] = serde_json::json!(file.class_names);
+        }
         console.event("team", &done);
         return Ok(());
     }

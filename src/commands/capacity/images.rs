@@ -141,8 +141,9 @@ fn waiting(
             .collect();
         if free.len() < per_class {
             let found = free.len();
+            let class = dataset.class_names().name(label);
             let text = format!(
-                "capacity: waiting_images: expected {per_class} of class {label}, found {found}"
+                "capacity: waiting_images: expected {per_class} of class {class}, found {found}"
             );
             let advice = match found * classes.len() {
                 0 => "clean = false needs none".to_string(),

@@ -233,12 +233,10 @@ fn stimuli(canvas: &mut Canvas, walk: &Walk, rollout: &Range<usize>, plot: &Plot
                 robot::stimulus(canvas, at, STIMULUS, &phase.seen.stimulus);
             }
             if room >= STIMULUS + 18.0 {
-                let name = phase
-                    .seen
-                    .label
-                    .split(' ')
-                    .next()
-                    .expect("a split text has a first piece");
+                let label = &phase.seen.label;
+                let name = label
+                    .rsplit_once(" (")
+                    .map_or(label.as_str(), |(name, _)| name);
                 canvas.fitted(
                     [at[0], at[1] + STIMULUS + 8.0],
                     name,

@@ -11,6 +11,7 @@ use crate::draw::plot::figure::{COLUMN, Figure, PAGE};
 use crate::draw::plot::{robot, scales};
 use crate::store::team::{Member, TeamFile};
 use crate::task::answer::Direction;
+use crate::task::class_names::ClassNames;
 
 /// Space between bodies, points.
 const GAP: f64 = 4.0;
@@ -18,8 +19,12 @@ const GAP: f64 = 4.0;
 /// Largest side of a body, points.
 const LARGEST: f64 = 110.0;
 
-/// Space for the caption below a body, points.
+/// Space for the caption below a body, points, and the height of its first lines.
 const CAPTION: f64 = 17.0;
+const CAPTION_LINE: f64 = 8.2;
+
+/// Largest width of a class's name beside and above the confusion matrix, points.
+const LONGEST_NAME: f64 = 90.0;
 
 /// Plots images by class and by the team's answer, most votes; returns `None` without answers.
 pub fn confusion(file: &TeamFile) -> Option<Figure> {
@@ -38,20 +43,38 @@ pub fn confusion(file: &TeamFile) -> Option<Figure> {
             .map(|text| fonts::width(&text, TEXT, false))
             .fold(0.0, f64::max)
     };
-    let names = widest(&mut file.classes.iter().map(u8::to_string));
+    let class_names = file.names();
+    let name = |class: &u8| fonts::fitted(&class_names.name(*class), TEXT, false, LONGEST_NAME);
+    let names = widest(&mut file.classes.iter().map(name));
     let numbers = widest(&mut votes.confusion.iter().flatten().map(usize::to_string));
     let left = MARGIN + (3.0 * TEXT).max(TEXT + names + 8.0);
+    // Names of columns that are wider than these stand upright.
+    let is_named = !class_names.all().is_empty();
+    let needed = if is_named {
+        numbers
+    } else {
+        names.max(numbers)
+    };
     // With many classes the figure is as wide as names and numbers need, up to a page.
     let within = |width: f64| (width - MARGIN - left) / count as f64;
-    let side = (names.max(numbers) + 3.0)
-        .min(within(PAGE))
-        .max(within(COLUMN));
+    let side = (needed + 3.0).min(within(PAGE)).max(within(COLUMN));
     let width = left + side * count as f64 + MARGIN;
-    let [every_row, every_column] = [TEXT, names + 2.0].map(|room| (room / side).ceil() as usize);
+    let is_upright = is_named && names + 2.0 > side;
+    let (across, high) = if is_upright {
+        (TEXT, names)
+    } else {
+        (names + 2.0, TEXT)
+    };
+    let [every_row, every_column] = [TEXT, across].map(|room| (room / side).ceil() as usize);
     let has_numbers = numbers <= side && TEXT <= side;
-    let top = heading(&mut canvas, "Answers of the team", &of, width) + 8.0 + 2.0 * TEXT;
+    let top =
+        heading(&mut canvas, "Answers of the team", &of, width) + 8.0 + 2.0 * TEXT + (high - TEXT);
     let middle = left + side * count as f64 / 2.0;
-    canvas.text([middle, top - 1.7 * TEXT], "answer", TextStyle::middle());
+    canvas.text(
+        [middle, top - 1.7 * TEXT - (high - TEXT)],
+        "answer",
+        TextStyle::middle(),
+    );
     let at = [MARGIN + TEXT, top + side * count as f64 / 2.0];
     canvas.text(
         at,
@@ -63,7 +86,7 @@ pub fn confusion(file: &TeamFile) -> Option<Figure> {
     );
     for (row, class) in file.classes.iter().enumerate() {
         let of_class: usize = votes.confusion[row].iter().sum();
-        let name = class.to_string();
+        let name = name(class);
         let y = top + side * row as f64;
         if row % every_row == 0 {
             canvas.text(
@@ -73,11 +96,17 @@ pub fn confusion(file: &TeamFile) -> Option<Figure> {
             );
         }
         if row % every_column == 0 {
-            canvas.text(
-                [left + side * (row as f64 + 0.5), top - 3.0],
-                &name,
-                TextStyle::middle(),
-            );
+            let x = left + side * (row as f64 + 0.5);
+            let upright = TextStyle {
+                upwards: true,
+                ..TextStyle::default()
+            };
+            let (x, style) = if is_upright {
+                (x + 0.36 * TEXT, upright)
+            } else {
+                (x, TextStyle::middle())
+            };
+            canvas.text([x, top - 3.0], &name, style);
         }
         for (column, images) in votes.confusion[row].iter().enumerate() {
             let x = left + side * column as f64;
@@ -118,11 +147,13 @@ pub fn poster(file: &TeamFile) -> Option<Figure> {
     if file.members.is_empty() {
         return None;
     }
-    let captions = file
+    let captions = Captions::of(file);
+    let widths = file
         .members
         .iter()
-        .map(|member| fonts::width(&ways(member, f64::INFINITY), TEXT, false));
-    let widest = captions.fold(1.0, f64::max).min(LARGEST);
+        .flat_map(|member| captions.ways(member, f64::INFINITY))
+        .map(|line| fonts::width(&line, TEXT, false));
+    let (widest, below) = (widths.fold(1.0, f64::max).min(LARGEST), captions.height());
     // Columns wide enough for the caption below a body.
     let most = ((PAGE - 2.0 * MARGIN) / widest) as usize;
     let of_pairs = triangle(file).filter(|_| file.classes.len() - 1 <= most);
@@ -147,10 +178,10 @@ pub fn poster(file: &TeamFile) -> Option<Figure> {
     for (member, [column, line]) in file.members.iter().zip(&places) {
         let at = [
             MARGIN + (side + GAP) * *column as f64,
-            top + (side + CAPTION) * *line as f64,
+            top + (side + below) * *line as f64,
         ];
         drawn(&mut canvas, at, side, &member.body);
-        caption(
+        captions.write(
             &mut canvas,
             [at[0] + side / 2.0, at[1] + side],
             side,
@@ -158,7 +189,7 @@ pub fn poster(file: &TeamFile) -> Option<Figure> {
         );
     }
     // The lower left of the triangle is free.
-    let bottom = top + (side + CAPTION) * lines as f64;
+    let bottom = top + (side + below) * lines as f64;
     let materials: Vec<Material> = Material::ALL
         .into_iter()
         .filter(|material| !material.is_empty())
@@ -237,46 +268,68 @@ fn drawn(canvas: &mut Canvas, at: [f64; 2], side: f64, body: &Body) {
     robot::body_outline(canvas, at, cell, body, Pen::new(colour::INK, 0.4));
 }
 
-/// Writes the classes that a robot tells apart by walking left or right, and its accuracy.
-fn caption(canvas: &mut Canvas, [middle, y]: [f64; 2], most: f64, member: &Member) {
-    canvas.text(
-        [middle, y + 7.5],
-        &ways(member, most + GAP),
-        TextStyle::middle(),
-    );
-    let accuracy = format!("{} %", percent(member.own.accuracy));
-    canvas.fitted(
-        [middle, y + 15.0],
-        &accuracy,
-        most,
-        TextStyle {
-            size: 6.2,
-            ..TextStyle::middle()
-        }
-        .colour(colour::FAINT),
-    );
+/// Writes the classes that a robot tells apart below its body, and its accuracy.
+struct Captions {
+    names: ClassNames,
+    /// The number of lines for the classes: each side of named ones has its own.
+    lines: usize,
 }
 
-/// Returns the classes under which the robot walks left, a bar, and those under which it walks
-/// right, as many as fit.
-fn ways(member: &Member, most: f64) -> String {
-    let (a, b) = if member.first_group_walks == Direction::Left.name() {
-        (0, 1)
-    } else {
-        (1, 0)
-    };
-    let groups = [a, b].map(|k| {
-        let classes: Vec<String> = member.groups[k].iter().map(u8::to_string).collect();
-        classes.join(" ")
-    });
-    let with = |[left, right]: [&str; 2]| format!("← {left} | {right} →");
-    let room = most - fonts::width(&with(["", ""]), TEXT, false);
-    let [left, right] = [&groups[0], &groups[1]].map(|group| fonts::width(group, TEXT, false));
-    // A side that needs less than half leaves the rest to the other.
-    let fitted = |k: usize, other: f64| {
-        fonts::fitted(&groups[k], TEXT, false, (room / 2.0).max(room - other))
-    };
-    with([&fitted(0, right), &fitted(1, left)])
+impl Captions {
+    fn of(file: &TeamFile) -> Self {
+        let names = file.names();
+        let lines = if names.all().is_empty() { 1 } else { 2 };
+        Captions { names, lines }
+    }
+
+    /// Returns the height of a caption, points.
+    fn height(&self) -> f64 {
+        CAPTION + CAPTION_LINE * (self.lines - 1) as f64
+    }
+
+    fn write(&self, canvas: &mut Canvas, [middle, y]: [f64; 2], most: f64, member: &Member) {
+        let below = CAPTION_LINE * (self.lines - 1) as f64;
+        for (line, text) in self.ways(member, most + GAP).iter().enumerate() {
+            let y = y + 7.5 + CAPTION_LINE * line as f64;
+            canvas.text([middle, y], text, TextStyle::middle());
+        }
+        let accuracy = format!("{} %", percent(member.own.accuracy));
+        canvas.fitted(
+            [middle, y + below + 15.0],
+            &accuracy,
+            most,
+            TextStyle {
+                size: 6.2,
+                ..TextStyle::middle()
+            }
+            .colour(colour::FAINT),
+        );
+    }
+
+    /// Returns the classes under which the robot walks left, and those under which it walks right,
+    /// as many as fit: in a line with a bar between them, or in a line each.
+    fn ways(&self, member: &Member, most: f64) -> Vec<String> {
+        let (a, b) = if member.first_group_walks == Direction::Left.name() {
+            (0, 1)
+        } else {
+            (1, 0)
+        };
+        let groups = [a, b].map(|k| self.names.side(&member.groups[k]));
+        let width = |text: &str| fonts::width(text, TEXT, false);
+        if self.lines == 2 {
+            let room = most - width("← ");
+            let [left, right] = groups.map(|group| fonts::fitted(&group, TEXT, false, room));
+            return vec![format!("← {left}"), format!("{right} →")];
+        }
+        let with = |[left, right]: [&str; 2]| format!("← {left} | {right} →");
+        let room = most - width(&with(["", ""]));
+        let [left, right] = [&groups[0], &groups[1]].map(|group| width(group));
+        // A side that needs less than half leaves the rest to the other.
+        let fitted = |k: usize, other: f64| {
+            fonts::fitted(&groups[k], TEXT, false, (room / 2.0).max(room - other))
+        };
+        vec![with([&fitted(0, right), &fitted(1, left)])]
+    }
 }
 
 #[cfg(test)]
@@ -303,11 +356,16 @@ mod tests {
             displacements: Vec::new(),
             shown: Vec::new(),
         };
+        let captions = Captions {
+            names: ClassNames::default(),
+            lines: 1,
+        };
         let said = |member: &Member| {
             let mut canvas = Canvas::new();
-            caption(&mut canvas, [50.0, 50.0], 110.0, member);
+            captions.write(&mut canvas, [50.0, 50.0], 110.0, member);
             canvas.svg()
         };
+        let ways = |member: &Member, most| captions.ways(member, most).concat();
         assert!(
             said(&member).contains(">← 1 2 3 | 0 →<"),
             "{}",

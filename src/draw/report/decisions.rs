@@ -62,7 +62,9 @@ pub(crate) fn table(file: &TeamFile) -> Option<(Vec<String>, Vec<Vec<String>>)> 
     let mut headers = ["answers", "accuracy %", "95 % interval"]
         .map(str::to_string)
         .to_vec();
-    headers.extend(file.classes.iter().map(|class| format!("% of {class}")));
+    let names = file.names();
+    let of = |class: &u8| format!("% of {}", names.name(*class));
+    headers.extend(file.classes.iter().map(of));
     Some((
         headers,
         rows.map(|(row, classes)| [row, classes].concat()).to_vec(),

@@ -66,8 +66,9 @@
   const team = document.querySelector("#team .watch")?.closest("section");
   if (!team) return;
   const $ = (what) => team.querySelector(what);
-  const { members, classes, threshold, unit, steps, materials } = JSON.parse(document.getElementById("team-robots").textContent);
-  const stages = new Stages.Team($(".stages"), $(".tally"), { members, classes, threshold, materials });
+  const { members, classes, class_names, threshold, unit, steps, materials } = JSON.parse(document.getElementById("team-robots").textContent);
+  const stages = new Stages.Team($(".stages"), $(".tally"), { members, classes, class_names, threshold, materials });
+  const { name } = Drawing.classNames(class_names);
   const time = $("input"), last = steps.length - 1;
   // Points of a robot at all moments: differences of 8 bits to the moment before, at first 16-bit numbers.
   const moments = (text, count) => {
@@ -90,7 +91,7 @@
     const tally = walk.tallies[Math.floor(at)], over = at >= last, says = over ? walk.answer : tally.says;
     stages.draw(members.map((_, k) => stand(k, at)), walk.starts, { ...tally, says });
     const verdict = over ? (says === walk.class ? ": correct" : ": wrong") : "";
-    $(".says").textContent = `step ${steps[Math.floor(at)]} ` + (says === null ? "" : `says ${says}${verdict}`);
+    $(".says").textContent = `step ${steps[Math.floor(at)]} ` + (says === null ? "" : `says ${name(says)}${verdict}`);
     $(".play").textContent = playing === null ? "Play" : "Pause";
   };
   const at = () => Number(time.value);

@@ -7,6 +7,7 @@ use crate::base::number::percent;
 use crate::base::text::counted;
 use crate::base::text::duration;
 use crate::baseline::curve::Crossing;
+use crate::data::dataset::Split;
 use crate::draw::html::escape;
 use crate::draw::report::words;
 use crate::sim::InstructionSet;
@@ -108,11 +109,12 @@ pub(super) fn trainings(runs: &[Dossier]) -> String {
 pub(super) fn about(dossier: &Dossier) -> String {
     let run = &dossier.run;
     let stats = run.stats;
+    let names = run.config.class_names();
     let images: Vec<String> = run
         .training_images
         .iter()
         .take(12)
-        .map(|image| format!("{} (train {})", image.label, image.index))
+        .map(|image| image.called(Split::Train, &names))
         .collect();
     let more = run.training_images.len().saturating_sub(images.len());
     let more = if more > 0 {

@@ -5,7 +5,7 @@ use crate::analysis::votes::Tally;
 use crate::base::Grid;
 use crate::base::threads::in_pool;
 use crate::draw::error::PictureError;
-use crate::draw::html::{corners, escape, materials, pack};
+use crate::draw::html::{corners, escape, materials, named, pack};
 use crate::draw::plot;
 use crate::draw::plot::{COLUMN, Figure};
 use crate::draw::report::decisions;
@@ -140,10 +140,12 @@ fn robots(team: &Team, walks: &[PackedWalk], shown: &[usize]) -> Value {
             "voxels": corners(&member.body, &walk.voxels), "at": walk.begin,
         })
     };
-    json!({
+    let mut robots = json!({
         "members": file.members.iter().zip(walks).map(robot).collect::<Vec<_>>(), "classes": file.classes,
         "threshold": file.threshold, "unit": STEPS, "steps": shown, "materials": materials(),
-    })
+    });
+    named(&mut robots, &file.names());
+    robots
 }
 
 /// Returns all walks under an image, and the tally at every moment.
@@ -175,16 +177,17 @@ fn answer(team: &Team, number: usize) -> u8 {
 /// Returns a button that plays the walks under an image.
 fn button(team: &Team, number: usize) -> String {
     let image = team.file.images[team.images[number]];
-    let answer = answer(team, number);
+    let (answer, names) = (answer(team, number), team.file.names());
+    let says = escape(&names.name(answer));
     let label = format!(
-        "class {}, {} {}: says {answer}",
-        image.label,
+        "class {}, {} {}: says {says}",
+        escape(&names.name(image.label)),
         team.file.split.split(),
         image.index
     );
     format!(
         "<button type=\"button\" data-walks=\"team-{number}\" data-right=\"{}\" aria-pressed=\"false\" \
-         aria-label=\"{label}\" title=\"{label}\">{}<small>says {answer}</small></button>",
+         aria-label=\"{label}\" title=\"{label}\">{}<small>says {says}</small></button>",
         answer == image.label,
         thumbnail(&team.together[number].stimulus)
     )

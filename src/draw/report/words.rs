@@ -188,10 +188,11 @@ pub(super) fn methods(dossier: &Dossier) -> String {
             .filter(|image| image.label == label)
             .count()
     };
+    let names = config.class_names();
     let images: Vec<String> = config
         .classes()
         .into_iter()
-        .map(|class| format!("{} of class {class}", counts(class)))
+        .map(|class| format!("{} of class {}", counts(class), names.name(class)))
         .collect();
     let shown = if run.origin.is_some() {
         "The fitness is that on"

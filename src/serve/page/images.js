@@ -24,8 +24,11 @@ export class Images {
   async open(name) {
     this.set = this.sets.find((set) => set.name === name) ?? this.set;
     $("set").value = this.set.name;
+    this.names = Drawing.classNames(this.set.class_names);
+    $("classes").toggleAttribute("data-named", !!this.set.class_names);
     $("classes").replaceChildren(...this.set.classes.map(([label]) => {
-      const button = element("button", { type: "button", textContent: String(label) });
+      const button = element("button", { type: "button", textContent: this.names.name(label), title: this.set.class_names?.[label] ?? "" });
+      button.dataset.class = label;
       button.onclick = () => this.show(label);
       return button;
     }));
@@ -43,7 +46,7 @@ export class Images {
     this.wanted = wanted;
     const images = await get(wanted);
     if (this.wanted !== wanted) return;
-    [...$("classes").children].forEach((b) => b.setAttribute("aria-pressed", String(b.textContent === String(this.class))));
+    [...$("classes").children].forEach((b) => b.setAttribute("aria-pressed", String(Number(b.dataset.class) === this.class)));
     $("newer").disabled = this.from === 0;
     $("older").disabled = this.from + PAGE >= this.total;
     this.shown = images;
@@ -53,7 +56,7 @@ export class Images {
   draw() {
     const ink = hex(css("ink"));
     $("thumbs").replaceChildren(...(this.shown ?? []).map((image) => {
-      const canvas = element("canvas"), label = `A ${image.label}, image ${image.index}`;
+      const canvas = element("canvas"), what = this.names.a(image.label), label = `${what[0].toUpperCase()}${what.slice(1)}, image ${image.index}`;
       paint(canvas, image.pixels, ink);
       const button = element("button", { type: "button", title: label }, canvas);
       button.setAttribute("aria-label", label);
@@ -68,8 +71,10 @@ export class Images {
 
   choose(image) {
     this.mark({ set: this.set.name, index: image.index });
-    this.chosen({ image: { set: this.set.name, index: image.index }, about: `a ${image.label} (${this.set.name} test image ${image.index})` });
+    this.chosen({ image: { set: this.set.name, index: image.index }, about: this.about(image) });
   }
+
+  about({ label, index }) { return `${this.names.a(label)} (${this.set.name} test image ${index})`; }
 
   async lucky() {
     const all = this.labels ?? this.set.classes.map(([label]) => label);

@@ -11,6 +11,8 @@ import { Team } from "./team.js";
 
 // Strokes may follow each other that fast without a simulation for each.
 const AFTER_STROKE = 300, WHILE_DRAWING = 60;
+// An answer of more letters is set small.
+const LONG = 14;
 
 const materials = await get("api/materials");
 let simulation = null, timer = 0, seen = null, previous = 0, drawn = null, looked = 0;
@@ -165,22 +167,24 @@ const drawTeam = () => {
   if (!walk?.begun) return;
   const says = walk.tally?.says ?? null, known = walk.end && says !== null && walk.begun.classes.includes(walk.begun.seen.label);
   $("verdict").dataset.state = known ? (says === walk.begun.seen.label ? "right" : "wrong") : says === null ? (walk.end ? "none" : "idle") : "answer";
-  $("verdict").dataset.long = "false";
-  $("says").textContent = says === null ? (walk.end ? "undecided" : "") : says;
+  const said = says === null ? (walk.end ? "undecided" : "") : team.names.name(says);
+  $("verdict").dataset.long = String(said.length > LONG);
+  $("says").textContent = said;
   $("moved").textContent = `step ${walk.step} of ${walk.begun.until}`;
   const play = walk.end || walk.paused ? "Play" : "Pause";
   if ($("play").textContent !== play) $("play").textContent = play;
   if (walk.end && !walk.told) {
     walk.told = true;
     if (document.documentElement.dataset.state === "living") mark("over");
-    $("spoken").textContent = `The team sees ${picture.about}. It says ${says ?? "nothing"}.`;
+    $("spoken").textContent = `The team sees ${picture.about}. It says ${says === null ? "nothing" : said}.`;
   }
 };
 
 const words = (answer, over) => {
   const distance = Math.abs(answer.moved).toFixed(1);
   if (!answer.way) return { state: over ? "none" : "idle", says: over ? "undecided" : "", moved: `moved ${distance} voxels` };
-  const says = answer.says.length ? answer.says.join(" or ") : answer.way === "left" ? "←" : "→";
+  const { name } = Drawing.classNames(simulation.begun.class_names);
+  const says = answer.says.length ? answer.says.map(name).join(" or ") : answer.way === "left" ? "←" : "→";
   const label = simulation.phase(simulation.frame).label;
   const { left, right } = simulation.begun.judge ?? { left: [], right: [] };
   const known = over && answer.says.length && left.concat(right).includes(label);
@@ -196,7 +200,7 @@ const draw = () => {
   const unstable = simulation.over && simulation.end.unstable;
   const text = unstable ? { state: "none", says: "unstable", moved: simulation.end.unstable } : words(answer, simulation.over);
   $("verdict").dataset.state = text.state;
-  $("verdict").dataset.long = String(text.says.length > 14);
+  $("verdict").dataset.long = String(text.says.length > LONG);
   $("says").textContent = text.says;
   $("moved").textContent = text.moved;
   const play = simulation.over ? "Play" : simulation.playing ? "Pause" : "Play";
@@ -286,7 +290,7 @@ try {
   await images.load();
   // Something to see at once: a test image, unless motion is not wanted.
   const first = images.shown[0];
-  if (first) picture = { shown: { image: { set: images.set.name, index: first.index } }, about: `a ${first.label} (${images.set.name} test image ${first.index})` };
+  if (first) picture = { shown: { image: { set: images.set.name, index: first.index } }, about: images.about(first) };
   await robots.load();
   await team.load();
   if (window.matchMedia("(prefers-reduced-motion: reduce)").matches) simulation?.play(false);

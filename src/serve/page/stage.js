@@ -51,7 +51,7 @@ export class Stage {
 
   // Which way means what: the classes on both sides of the strip in which a walk says nothing.
   signs(ctx, simulation, answer, begin, scale, width, surface) {
-    const { judge, threshold } = simulation.begun, reach = threshold * scale;
+    const { judge, threshold, class_names } = simulation.begun, { side } = Drawing.classNames(class_names), reach = threshold * scale;
     ctx.strokeStyle = css("mark"); ctx.lineWidth = 1;
     for (const [x, dash] of [[begin, [5, 5]], [begin - reach, [1, 4]], [begin + reach, [1, 4]]]) {
       ctx.setLineDash(dash); ctx.beginPath(); ctx.moveTo(Math.round(x) + 0.5, 0); ctx.lineTo(Math.round(x) + 0.5, surface); ctx.stroke();
@@ -62,12 +62,16 @@ export class Stage {
     for (const way of ["left", "right"]) {
       const on = answer && answer.way === way, right = way === "right", classes = judge[way];
       let count = classes.length;
-      const text = () => classes.slice(0, count).join(" ") + (count < classes.length ? " …" : "");
+      const text = () => side(classes.slice(0, count)) + (count < classes.length ? " …" : "");
       ctx.fillStyle = css(on ? "accent" : "mark");
       ctx.textAlign = right ? "right" : "left";
-      ctx.font = "700 " + (text().length > 3 ? 22 : 30) + "px system-ui, sans-serif";
-      // Of many classes, as many as fit beside those of the other side.
-      while (count > 1 && ctx.measureText(text()).width > width / 2 - 60) count--;
+      let size = text().length > 3 ? 22 : 30;
+      const font = () => { ctx.font = `700 ${size}px system-ui, sans-serif`; };
+      font();
+      // Of many classes, as many as fit beside those of the other side; a long name is small.
+      const fits = () => ctx.measureText(text()).width <= width / 2 - 60;
+      while (count > 1 && !fits()) count--;
+      while (size > 12 && !fits()) { size--; font(); }
       ctx.fillText(right ? text() + " →" : "← " + text(), right ? width - 12 : 12, 8);
     }
   }

@@ -9,8 +9,8 @@ export class Team {
 
   // Who is in it.
   async load() {
-    const { members, classes } = await get("api/team");
-    this.members = members; this.classes = classes;
+    const { members, classes, class_names } = await get("api/team");
+    this.members = members; this.classes = classes; this.names = Drawing.classNames(class_names);
     $("about-team").textContent = `${members.length} robots, each of which tells two groups of classes apart, answer together. Each has one vote for every class of the side it walks to; a walk of at most 3 voxel lengths gives none.`;
   }
 
@@ -40,9 +40,9 @@ export class Team {
   }
 
   build() {
-    const { members, classes, threshold } = this.walk.begun;
+    const { members, classes, class_names, threshold } = this.walk.begun;
     const robots = members.map(({ name, voxels, points }) => ({ ...name, voxels, points }));
-    this.stages = new Stages.Team($("stages"), $("tally"), { members: robots, classes, threshold, materials: this.materials });
+    this.stages = new Stages.Team($("stages"), $("tally"), { members: robots, classes, class_names, threshold, materials: this.materials });
   }
 
   draw() {
