@@ -6,7 +6,7 @@ use crate::data::catalogue::{Catalogue, known_as};
 use crate::data::dataset::{Dataset, DatasetError, Split};
 use crate::data::files::DatasetPlace;
 #[cfg(feature = "import")]
-pub use crate::data::import::{self, ImportOptions, ImportSource, Imported};
+pub use crate::data::import::{self, ClassCount, ImportOptions, ImportSource, Imported};
 use crate::data::info::DatasetInfo;
 use std::collections::BTreeMap;
 

@@ -742,3 +742,761 @@ fn write(
             ..error
         })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::error::ErrorKind;
+    use crate::base::random::{Purpose, stream};
+    use crate::data::dataset::Dataset;
+    use crate::data::files::places;
+    use crate::data::import::arrays::{Array, Values};
+    use crate::data::import::pictures::tests as made;
+    use std::io::Write;
+    use std::sync::atomic::AtomicBool;
+
+    /// Returns a PNG with a bar of a brightness on a ground, at a place by its number.
+    fn bar(is_upright: bool, number: u8, ground: u8, ink: u8) -> Vec<u8> {
+        let at = usize::from(20 + number % 40);
+        let is_ink = |row: usize, column: usize| match is_upright {
+            true => (at..at + 6).contains(&column) && (10..80).contains(&row),
+            false => (at..at + 6).contains(&row) && (10..80).contains(&column),
+        };
+        let pixels: Vec<u8> = (0..90 * 100)
+            .map(|place| {
+                if is_ink(place / 100, place % 100) {
+                    ink
+                } else {
+                    ground
+                }
+            })
+            .collect();
+        made::png_bytes(
+            100,
+            90,
+            png::ColorType::Grayscale,
+            png::BitDepth::Eight,
+            &pixels,
+        )
+    }
+
+    struct Place(tempfile::TempDir);
+
+    impl Place {
+        fn new() -> Self {
+            Place(tempfile::tempdir().unwrap())
+        }
+
+        /// A folder with these classes of bars in `pictures`.
+        fn with_bars(count: u8) -> Self {
+            let place = Place::new();
+            for number in 0..count {
+                place.put(
+                    &format!("pictures/up/{number}.png"),
+                    &bar(true, number, 240, 10),
+                );
+                place.put(
+                    &format!("pictures/across/{number}.PNG"),
+                    &bar(false, number, 240, 10),
+                );
+            }
+            place
+        }
+
+        fn put(&self, name: &str, content: &[u8]) {
+            let path = self.0.path().join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, content).unwrap();
+        }
+
+        fn at(&self, name: &str) -> PathBuf {
+            self.0.path().join(name)
+        }
+
+        fn options(&self, name: &str) -> ImportOptions {
+            ImportOptions {
+                to: Some(self.at("out").join(name)),
+                ..ImportOptions::named(name)
+            }
+        }
+
+        fn import_with(
+            &self,
+            sources: &[&str],
+            options: &ImportOptions,
+        ) -> Result<Imported, Error> {
+            let paths = sources.iter().map(|name| self.at(name)).collect();
+            stage(ImportSource::Paths(paths), options, &Session::default())?.commit()
+        }
+
+        fn import(&self, sources: &[&str]) -> Result<Imported, Error> {
+            self.import_with(sources, &self.options("own"))
+        }
+
+        /// Imports what must be refused, and checks what is said and that nothing is left.
+        fn refused(&self, sources: &[&str], said: &str) {
+            let error = self.import(sources).unwrap_err();
+            assert!(error.to_string().contains(said), "{said}: {error}");
+            assert_eq!(error.kind, ErrorKind::Input, "{error}");
+            assert!(!self.at("out").exists(), "{said}");
+        }
+
+        fn loaded(&self) -> Dataset {
+            let places = places(Some(&self.at("out/own")), None, None);
+            Dataset::load("own", &places, &Split::ALL).unwrap()
+        }
+
+        fn bytes(&self, name: &str) -> Vec<u8> {
+            std::fs::read(self.at(name)).unwrap()
+        }
+    }
+
+    fn npy(descr: &str, shape: &[usize], data: &[u8]) -> Vec<u8> {
+        let sizes: Vec<String> = shape.iter().map(|size| format!("{size},")).collect();
+        let sizes = sizes.join(" ");
+        let header =
+            format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({sizes}), }}\n");
+        let length = (header.len() as u16).to_le_bytes();
+        [npy::MAGIC, &[1, 0], &length, header.as_bytes(), data].concat()
+    }
+
+    fn npz(arrays: &[(&str, Vec<u8>)]) -> Vec<u8> {
+        let mut writer = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+        for (name, content) in arrays {
+            let options = zip::write::SimpleFileOptions::default();
+            writer.start_file(format!("{name}.npy"), options).unwrap();
+            writer.write_all(content).unwrap();
+        }
+        writer.finish().unwrap().into_inner()
+    }
+
+    /// Returns pixels of 4 × 4 images and their labels, 0 and 1 in turn.
+    fn numbers(count: u8) -> (Vec<u8>, Vec<u8>) {
+        let image =
+            |number: u8| (0..16).map(move |pixel| if pixel == number % 16 { 255 } else { pixel });
+        let pixels = (0..count).flat_map(image).collect();
+        (pixels, (0..count).map(|number| number % 2).collect())
+    }
+
+    #[test]
+    fn a_folder_of_pictures_becomes_a_dataset_that_says_what_was_done() {
+        let place = Place::with_bars(5);
+        place.put("pictures/up/6.jpg", &made::jpeg_bytes()[..100]);
+        place.put("pictures/up/notes.txt", b"text");
+        place.put("pictures/up/.hidden.png", b"x");
+        let made = place.import(&["pictures"]).unwrap();
+        let count = |class, name: &str| ClassCount {
+            class,
+            name: Some(name.into()),
+            train: 4,
+            test: 1,
+        };
+        assert_eq!(made.classes, [count(0, "across"), count(1, "up")]);
+        assert_eq!(
+            (made.fit, made.size, made.sizes),
+            (Fitted::Content, [28, 28], [[90, 100]; 2])
+        );
+        assert!(made.inverted && !made.own_split && !made.transposed);
+        assert_eq!((made.refused.len(), made.passed_over), (1, 1));
+        assert_eq!(made.refused[0].source, "up/6.jpg");
+        let data = place.loaded();
+        assert_eq!((data.len(Split::Train), data.len(Split::Test)), (8, 2));
+        assert_eq!(data.class_names(), ["across", "up"]);
+        let image = data
+            .image(Split::Train, data.indices_of(Split::Train, 1)[0])
+            .unwrap();
+        // Upright and in the middle.
+        assert!(image[(14, 13)] > 200 && image[(5, 13)] > 200 && image[(14, 20)] == 0);
+        let table = String::from_utf8(place.bytes("out/own/images.csv")).unwrap();
+        assert!(
+            table.starts_with("split,index,class,name,source\ntrain,0,0,across,across/"),
+            "{table}"
+        );
+        assert_eq!(table.lines().count(), 11);
+        let entries = std::fs::read_dir(place.at("out")).unwrap();
+        assert_eq!(entries.count(), 1);
+    }
+
+    #[test]
+    fn nothing_depends_on_threads_and_the_split_on_the_seed_alone() {
+        let place = Place::with_bars(9);
+        let made = |name: &str, seed, threads| {
+            let options = ImportOptions {
+                seed,
+                ..place.options(name)
+            };
+            let session = Session::default().threads(Some(threads));
+            let source = ImportSource::Paths(vec![place.at("pictures")]);
+            stage(source, &options, &session).unwrap().commit().unwrap();
+            place.bytes(&format!("out/{name}/images.csv"))
+        };
+        let one = made("a", 1, 1);
+        assert_eq!(one, made("b", 1, 3));
+        assert_ne!(one, made("c", 2, 1));
+    }
+
+    #[test]
+    fn folders_named_as_splits_are_the_split_and_validation_is_for_tests_if_nothing_else_is() {
+        let place = Place::new();
+        for split in ["train", "Testing", "val"] {
+            for number in 0..3 {
+                place.put(
+                    &format!("p/{split}/a/{number}.png"),
+                    &bar(true, number, 0, 200),
+                );
+                place.put(
+                    &format!("p/{split}/b/{number}.png"),
+                    &bar(false, number, 0, 200),
+                );
+            }
+        }
+        let made = place.import(&["p"]).unwrap();
+        assert!(
+            made.own_split && !made.inverted && made.notes[0].contains("left out"),
+            "{made:?}"
+        );
+        assert_eq!((made.classes[0].train, made.classes[0].test), (3, 3));
+        std::fs::remove_dir_all(place.at("p/Testing")).unwrap();
+        std::fs::remove_dir_all(place.at("out")).unwrap();
+        let made = place.import(&["p"]).unwrap();
+        assert!(
+            made.own_split && made.notes[0].contains("are the test images"),
+            "{made:?}"
+        );
+        std::fs::remove_dir_all(place.at("p/val")).unwrap();
+        std::fs::remove_dir_all(place.at("out")).unwrap();
+        let made = place.import(&["p"]).unwrap();
+        assert!(!made.own_split, "{made:?}");
+        assert_eq!(made.classes.len(), 2);
+        // A class of its own.
+        place.put("q/train/1.png", &bar(true, 1, 0, 200));
+        place.put("q/train/2.png", &bar(true, 2, 0, 200));
+        place.put("q/car/1.png", &bar(false, 1, 0, 200));
+        place.put("q/car/2.png", &bar(false, 2, 0, 200));
+        let made = place.import_with(&["q"], &place.options("q")).unwrap();
+        assert_eq!(made.classes[1].name.as_deref(), Some("train"));
+    }
+
+    #[test]
+    fn folders_given_one_by_one_are_classes() {
+        let place = Place::with_bars(2);
+        let made = place.import(&["pictures/up", "pictures/across"]).unwrap();
+        let names: Vec<Option<&str>> = made
+            .classes
+            .iter()
+            .map(|class| class.name.as_deref())
+            .collect();
+        assert_eq!(names, [Some("across"), Some("up")]);
+    }
+
+    #[test]
+    fn arrays_tables_and_idx_files_of_the_same_images_become_the_same_dataset() {
+        let place = Place::new();
+        let (pixels, labels) = numbers(10);
+        let (test, of_test) = numbers(4);
+        let [x, xt] =
+            [(&pixels, 10), (&test, 4)].map(|(pixels, count)| npy("|u1", &[count, 4, 4], pixels));
+        let wide = |labels: &[u8]| -> Vec<u8> {
+            labels
+                .iter()
+                .flat_map(|l| i64::from(*l).to_le_bytes())
+                .collect()
+        };
+        let [y, yt] =
+            [(&labels, 10), (&of_test, 4)].map(|(l, count)| npy("<i8", &[count], &wide(l)));
+        let keras = [
+            ("x_test", xt.clone()),
+            ("x_train", x.clone()),
+            ("y_test", yt.clone()),
+            ("y_train", y.clone()),
+        ];
+        place.put("keras.npz", &npz(&keras));
+        keras
+            .iter()
+            .for_each(|(name, array)| place.put(&format!("npy/{name}.npy"), array));
+        let table = |pixels: &[u8], labels: &[u8]| -> String {
+            let rows = pixels.chunks(16).zip(labels);
+            rows.map(|(row, label)| {
+                format!(
+                    "{label},{}\n",
+                    row.iter().map(u8::to_string).collect::<Vec<_>>().join(",")
+                )
+            })
+            .collect()
+        };
+        place.put("csv/my_train.csv", table(&pixels, &labels).as_bytes());
+        place.put("csv/my_test.csv", table(&test, &of_test).as_bytes());
+        let idx = |sizes: &[u32], content: &[u8]| [idx::header(sizes), content.to_vec()].concat();
+        place.put("idx/train-pixels", &idx(&[10, 4, 4], &pixels));
+        place.put("idx/train-answers", &idx(&[10], &labels));
+        place.put("idx/t10k-pixels", &idx(&[4, 4, 4], &test));
+        place.put("idx/t10k-answers", &idx(&[4], &of_test));
+        let real: Vec<u8> = pixels
+            .iter()
+            .flat_map(|p| (f64::from(*p) / 255.0).to_le_bytes())
+            .collect();
+        let names =
+            |labels: &[u8]| -> Vec<u8> { labels.iter().map(|label| b'0' + label).collect() };
+        place.put(
+            "f.npz",
+            &npz(&[
+                ("train_images", npy("<f8", &[10, 16], &real)),
+                ("train_labels", npy("|S1", &[10, 1], &names(&labels))),
+                ("test_images", npy("|u1", &[4, 4, 4, 1], &test)),
+                ("test_labels", yt),
+            ]),
+        );
+        let mut all = Vec::new();
+        for source in ["keras.npz", "npy", "csv", "idx", "f.npz"] {
+            let made = place
+                .import_with(&[source], &place.options(source))
+                .unwrap();
+            assert!(made.own_split && made.fit == Fitted::Kept, "{source}");
+            let files = [
+                "train-images-idx3-ubyte",
+                "train-labels-idx1-ubyte",
+                "t10k-images-idx3-ubyte",
+            ];
+            all.push(files.map(|file| place.bytes(&format!("out/{source}/{file}"))));
+        }
+        assert_eq!(all[0][0][16..], pixels);
+        for (number, other) in all.iter().enumerate() {
+            // Bytes and fractions together are refused or of one scale, so these are darker.
+            assert!(number == 4 || *other == all[0], "{number}");
+        }
+    }
+
+    #[test]
+    fn files_of_emnist_are_turned_and_said_to_be_and_others_if_asked() {
+        let place = Place::new();
+        let (pixels, labels) = numbers(10);
+        let idx = |sizes: &[u32], content: &[u8]| [idx::header(sizes), content.to_vec()].concat();
+        for folder in ["emnist", "plain"] {
+            place.put(&format!("{folder}/a"), &idx(&[10, 4, 4], &pixels));
+            place.put(&format!("{folder}/b"), &idx(&[10], &labels));
+        }
+        let first = |name: &str| {
+            place.bytes(&format!("out/{name}/train-images-idx3-ubyte"))[16..32].to_vec()
+        };
+        let made = place.import_with(&["emnist"], &place.options("a")).unwrap();
+        assert!(made.transposed && made.emnist);
+        assert!(
+            !place
+                .import_with(&["plain"], &place.options("b"))
+                .unwrap()
+                .transposed
+        );
+        let turned = ImportOptions {
+            transpose: Some(true),
+            ..place.options("c")
+        };
+        let made = place.import_with(&["plain"], &turned).unwrap();
+        assert!(made.transposed && !made.emnist);
+        let stored = ImportOptions {
+            transpose: Some(false),
+            ..place.options("emnist-d")
+        };
+        assert!(!place.import_with(&["emnist"], &stored).unwrap().transposed);
+        assert_eq!(first("a"), first("c"));
+        assert_eq!(first("b"), first("emnist-d"));
+        assert_eq!(first("a")[1], first("b")[4]);
+        // It is read as it is, whatever its name.
+        let data = Dataset::load(
+            "emnist-d",
+            &places(Some(&place.at("out/emnist-d")), None, None),
+            &Split::ALL,
+        );
+        assert!(!data.unwrap().is_transposed());
+    }
+
+    #[test]
+    fn sources_without_a_dataset_are_refused_and_nothing_is_left() {
+        let place = Place::with_bars(3);
+        let (pixels, labels) = numbers(4);
+        place.refused(&["none"], "none: cannot be read");
+        place.refused(&["pictures/up"], "no subfolder for each class");
+        place.put("empty/readme", b"x");
+        place.refused(&["empty"], "expected a folder with one subfolder");
+        place.refused(
+            &["empty/readme"],
+            "expected a label and the pixels of a square",
+        );
+        place.put("one/a/1.png", &bar(true, 1, 0, 9));
+        place.refused(&["one"], "of one class, a: expected two");
+        place.put("broken/a/1.png", b"x");
+        place.put("broken/b/1.png", b"");
+        place.refused(&["broken"], "no image can be read: a/1.png is no picture");
+        place.put("half/a/1.png", &bar(true, 1, 0, 9));
+        place.put("half/b/1.png", b"");
+        place.refused(
+            &["half"],
+            "no image of the class b can be read; b/1.png is empty",
+        );
+        place.put("few/a/1.png", &bar(true, 1, 0, 9));
+        place.put("few/b/1.png", &bar(false, 1, 0, 9));
+        place.refused(&["few"], "only one image of the class a");
+        std::fs::create_dir_all(place.at("hollow/b")).unwrap();
+        place.put("hollow/a/1.png", &bar(true, 1, 0, 9));
+        place.refused(&["hollow"], "b: has no picture");
+        for name in [
+            "same/a/1.png",
+            "same/a/2.png",
+            "same/b/1.png",
+            "same/b/2.png",
+        ] {
+            place.put(name, &bar(true, 1, 0, 9));
+        }
+        place.refused(&["same"], "are the same");
+        for (name, is_test) in [
+            ("t/train/a/1", false),
+            ("t/train/b/2", true),
+            ("t/test/a/3", false),
+        ] {
+            place.put(&format!("{name}.png"), &bar(is_test, 3, 0, 9));
+        }
+        place.refused(&["t"], "no test image of the class b");
+        place.put("both/a.csv", b"1,2,3,4,5");
+        place.put("both/b.npz", b"");
+        place.refused(&["both"], "several kinds: .npz, CSV");
+        place.put("b.npz", b"PK\x03\x04");
+        place.refused(&["b.npz"], "no whole .npz");
+        place.put(
+            "count.npz",
+            &npz(&[
+                ("x", npy("|u1", &[4, 4, 4], &pixels)),
+                ("y", npy("|u1", &[3], &labels[..3])),
+            ]),
+        );
+        place.refused(&["count.npz"], "has 3 labels, expected 4");
+        place.put(
+            "three.npz",
+            &npz(&[
+                ("a", npy("|u1", &[4, 4, 4], &pixels)),
+                ("b", npy("|u1", &[4, 4, 4], &pixels)),
+            ]),
+        );
+        place.refused(&["three.npz"], "found three.npz:a (4 × 4 × 4)");
+        place.put(
+            "range.npz",
+            &npz(&[
+                ("x", npy("|i1", &[4, 4, 4], &pixels)),
+                ("y", npy("|u1", &[4], &labels)),
+            ]),
+        );
+        place.refused(&["range.npz"], "found -1 to 15");
+        place.put(
+            "shape.npz",
+            &npz(&[
+                ("x", npy("|u1", &[4, 8], &pixels[..32])),
+                ("y", npy("|u1", &[4], &labels)),
+            ]),
+        );
+        place.refused(&["shape.npz"], "squares");
+        let other = npy("|u1", &[2, 5, 5], &[&pixels[..25], &pixels[9..34]].concat());
+        let sizes = [
+            ("x_train", npy("|u1", &[4, 4, 4], &pixels)),
+            ("y_train", npy("|u1", &[4], &labels)),
+            ("x_test", other),
+            ("y_test", npy("|u1", &[2], &labels[..2])),
+        ];
+        place.put("sizes.npz", &npz(&sizes));
+        place.refused(
+            &["sizes.npz"],
+            "training images have 4 × 4 pixels, test images 5 × 5",
+        );
+        let whole = ImportOptions {
+            fit: Fit::Whole,
+            ..place.options("whole")
+        };
+        assert_eq!(
+            place.import_with(&["sizes.npz"], &whole).unwrap().size,
+            [28, 28]
+        );
+        let keep = ImportOptions {
+            fit: Fit::Keep,
+            ..place.options("keep")
+        };
+        let error = place.import_with(&["sizes.npz"], &keep).unwrap_err();
+        assert!(
+            error.to_string().contains("only if all have one size"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn options_out_of_range_and_folders_that_are_taken_are_refused() {
+        let place = Place::with_bars(2);
+        let with = |change: fn(&mut ImportOptions)| {
+            let mut options = place.options("own");
+            change(&mut options);
+            place.import_with(&["pictures"], &options)
+        };
+        for change in [
+            |options: &mut ImportOptions| options.name = "mnist".into(),
+            |options: &mut ImportOptions| options.name = "builtin".into(),
+            |options: &mut ImportOptions| options.name = "../x".into(),
+            |options: &mut ImportOptions| options.test = 0.0,
+            |options: &mut ImportOptions| options.test = f64::NAN,
+            |options: &mut ImportOptions| options.size = 3,
+        ] {
+            assert_eq!(with(change).unwrap_err().kind, ErrorKind::Usage);
+        }
+        with(|_| ()).unwrap();
+        assert_eq!(with(|_| ()).unwrap_err().kind, ErrorKind::Occupied);
+        with(|options| options.force = true).unwrap();
+        // The pictures themselves are never replaced.
+        place.put("pictures/dataset.json", b"{}");
+        let onto = ImportOptions {
+            to: Some(place.at("pictures")),
+            force: true,
+            ..place.options("own")
+        };
+        assert_eq!(
+            place.import_with(&["pictures"], &onto).unwrap_err().kind,
+            ErrorKind::Usage
+        );
+        assert!(place.at("pictures/up/0.png").exists());
+    }
+
+    #[test]
+    fn a_stop_leaves_nothing() {
+        let place = Place::with_bars(2);
+        let stop = AtomicBool::new(true);
+        let source = ImportSource::Paths(vec![place.at("pictures")]);
+        let stopped = stage(source, &place.options("own"), &Session::new(&stop, &()));
+        assert_eq!(
+            stopped.err().map(|error| error.kind),
+            Some(ErrorKind::Stopped)
+        );
+        assert!(!place.at("out").exists());
+        // A folder that is dropped before it is in its place goes, too.
+        let source = ImportSource::Paths(vec![place.at("pictures")]);
+        drop(stage(source, &place.options("own"), &Session::default()).unwrap());
+        assert!(!place.at("out").exists());
+    }
+
+    #[test]
+    fn images_in_memory_are_imported_as_files_are() {
+        let place = Place::new();
+        let (pixels, labels) = numbers(10);
+        let array = |name: &str, shape: &[usize], values| Array {
+            name: name.into(),
+            shape: shape.to_vec(),
+            values,
+        };
+        let names = Values::Texts(
+            labels
+                .iter()
+                .map(|label| format!("class {label}"))
+                .collect(),
+        );
+        let labelled = Labelled {
+            images: array("pixels", &[10, 4, 4], Values::Bytes(pixels)),
+            labels: array("labels", &[10], names),
+            split: None,
+        };
+        let source = ImportSource::Arrays(vec![labelled]);
+        let made = stage(source, &place.options("own"), &Session::default())
+            .unwrap()
+            .commit()
+            .unwrap();
+        assert_eq!(made.classes[1].name.as_deref(), Some("class 1"));
+        let picture = |number: u8| InMemory {
+            pixels: Grid::from_fn(3 + usize::from(number), 5, |row, column| {
+                (row == 1 && column > 1) as u8 * 99 + number
+            }),
+            class: ClassLabel::Number(i64::from(number % 2)),
+            split: Some(if number < 3 {
+                Split::Train
+            } else {
+                Split::Test
+            }),
+        };
+        let source = ImportSource::Pictures((0..6).map(picture).collect());
+        let made = stage(source, &place.options("other"), &Session::default())
+            .unwrap()
+            .commit()
+            .unwrap();
+        assert_eq!(
+            (made.own_split, made.classes[0].train, made.classes[1].test),
+            (true, 2, 2)
+        );
+    }
+
+    #[cfg(feature = "parquet")]
+    mod of_parquet {
+        use super::*;
+        use ::parquet::data_type::{ByteArray, ByteArrayType, Int64Type};
+        use ::parquet::file::metadata::KeyValue;
+        use ::parquet::file::properties::WriterProperties;
+        use ::parquet::file::writer::SerializedFileWriter;
+        use ::parquet::schema::parser::parse_message_type;
+        use std::sync::Arc;
+
+        /// Returns a file as image datasets are published.
+        pub(super) fn file(
+            pictures: &[Vec<u8>],
+            labels: &[i64],
+            schema: &str,
+            noted: Option<&str>,
+        ) -> Vec<u8> {
+            let schema = Arc::new(parse_message_type(schema).unwrap());
+            let noted =
+                noted.map(|text| vec![KeyValue::new("huggingface".to_string(), text.to_string())]);
+            let properties = WriterProperties::builder()
+                .set_compression(::parquet::basic::Compression::SNAPPY)
+                .set_key_value_metadata(noted)
+                .build();
+            let mut bytes = Vec::new();
+            let mut writer =
+                SerializedFileWriter::new(&mut bytes, schema, Arc::new(properties)).unwrap();
+            let mut group = writer.next_row_group().unwrap();
+            while let Some(mut column) = group.next_column().unwrap() {
+                let count = pictures.len();
+                match column.untyped() {
+                    ::parquet::column::writer::ColumnWriter::ByteArrayColumnWriter(typed) => {
+                        let values: Vec<ByteArray> =
+                            pictures.iter().map(|bytes| bytes.clone().into()).collect();
+                        typed
+                            .write_batch(&values, Some(&vec![2; count]), None)
+                            .unwrap();
+                    }
+                    _ => {
+                        let typed = column.typed::<Int64Type>();
+                        typed
+                            .write_batch(labels, Some(&vec![1; count]), None)
+                            .unwrap();
+                    }
+                }
+                column.close().unwrap();
+            }
+            group.close().unwrap();
+            writer.close().unwrap();
+            let _ = std::marker::PhantomData::<ByteArrayType>;
+            bytes
+        }
+
+        pub(super) const SCHEMA: &str = "message schema {
+            optional group image { optional binary bytes; }
+            optional int64 label;
+        }";
+        pub(super) const NOTED: &str = r#"{"info": {"features": {"label": {"names": ["up", "across"], "_type": "ClassLabel"}}}}"#;
+
+        #[test]
+        fn files_named_after_splits_are_read_with_the_names_of_their_classes() {
+            let place = Place::new();
+            let pictures: Vec<Vec<u8>> = (0..6)
+                .map(|number| bar(number % 2 == 0, number, 0, 200))
+                .collect();
+            let labels = [0, 1, 0, 1, 0, -1];
+            let test = file(&pictures[..2], &labels[..2], SCHEMA, Some(NOTED));
+            place.put("repo/data/test-00000-of-00001.parquet", &test);
+            for (number, range) in [(0, 0..3), (1, 3..6)] {
+                let train = file(
+                    &pictures[range.clone()],
+                    &labels[range],
+                    SCHEMA,
+                    Some(NOTED),
+                );
+                place.put(
+                    &format!("repo/data/train-0000{number}-of-00002.parquet"),
+                    &train,
+                );
+            }
+            place.put("repo/README.md", b"x");
+            let made = place.import(&["repo"]).unwrap();
+            let counts: Vec<(Option<&str>, usize, usize)> = made
+                .classes
+                .iter()
+                .map(|class| (class.name.as_deref(), class.train, class.test))
+                .collect();
+            assert_eq!(counts, [(Some("up"), 3, 1), (Some("across"), 2, 1)]);
+            assert_eq!(made.refused.len(), 1);
+            assert!(
+                made.refused[0].reason.contains("no label"),
+                "{:?}",
+                made.refused
+            );
+            let other = "message schema { optional int64 a; optional int64 b; }";
+            place.put("other.parquet", &file(&pictures[..2], &[0, 1], other, None));
+            std::fs::remove_dir_all(place.at("out")).unwrap();
+            place.refused(&["other.parquet"], "found the columns a, b");
+            place.put("cut.parquet", &test[..test.len() - 9]);
+            place.refused(&["cut.parquet"], "no whole Parquet file");
+        }
+    }
+
+    #[test]
+    fn no_file_makes_the_import_panic_however_it_is_broken() {
+        let place = Place::new();
+        let (pixels, labels) = numbers(8);
+        let x = npy("|u1", &[8, 4, 4], &pixels);
+        let mut files: Vec<(&str, Vec<u8>)> = vec![
+            (
+                "a.npz",
+                npz(&[("x", x.clone()), ("y", npy("|u1", &[8], &labels))]),
+            ),
+            (
+                "a.csv",
+                b"label,a,b,c,d\n1,0,1,2,3\n2,9,9,9,8\n1,0,1,2,4\n2,9,9,9,7\n".to_vec(),
+            ),
+        ];
+        #[cfg(feature = "parquet")]
+        {
+            let pictures: Vec<Vec<u8>> = (0..4)
+                .map(|number| bar(number % 2 == 0, number, 0, 200))
+                .collect();
+            let file = of_parquet::file(
+                &pictures,
+                &[0, 1, 0, 1],
+                of_parquet::SCHEMA,
+                Some(of_parquet::NOTED),
+            );
+            files.push(("a.parquet", file));
+        }
+        let pictures = made::all();
+        assert!(
+            pictures
+                .iter()
+                .all(|picture| pictures::grey(picture).is_ok())
+        );
+        let mut chance = stream(1, Purpose::Import, 1, 0);
+        let mut broken = |good: &[u8]| {
+            let mut bytes = good.to_vec();
+            for _ in 0..1 + chance.below(3) {
+                let at = chance
+                    .below(bytes.len().max(1))
+                    .min(bytes.len().saturating_sub(1));
+                match chance.below(4) {
+                    0 => bytes.truncate(at),
+                    1 => bytes.insert(at, chance.below(256) as u8),
+                    _ if bytes.is_empty() => {}
+                    _ => bytes[at] = [0, 255, 128, chance.below(256) as u8][chance.below(4)],
+                }
+            }
+            bytes
+        };
+        for picture in &pictures {
+            (0..picture.len()).for_each(|end| drop(pictures::grey(&picture[..end])));
+            (0..400).for_each(|_| drop(pictures::grey(&broken(picture))));
+        }
+        for (name, good) in &files {
+            place.put(name, good);
+            let keep = ImportOptions {
+                fit: Fit::Keep,
+                ..place.options(name)
+            };
+            place.import_with(&[name], &keep).unwrap();
+            for _ in 0..150 {
+                place.put(name, &broken(good));
+                let found = source::find(&[place.at(name)], "own", &Session::default());
+                if let Ok(found) = found {
+                    found
+                        .items
+                        .iter()
+                        .for_each(|item| drop(decoded(item, &place.options("x"))));
+                }
+            }
+        }
+    }
+}

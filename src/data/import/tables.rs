@@ -94,12 +94,14 @@ fn table(
     let mut record = csv::ByteRecord::new();
     // The label's column and the number of columns, from the first row.
     let mut columns: Option<(usize, usize, usize)> = None;
+    let mut place_of = Lines::new(content);
     loop {
-        let line = reader.position().line();
+        let begin = reader.position().byte();
         match reader.read_byte_record(&mut record) {
             Ok(true) => {}
             Ok(false) => break,
             Err(error) => {
+                let line = place_of.line(begin);
                 refused.push(Refused::new(
                     format!("{}:{line}", file.name),
                     error.to_string(),
@@ -107,7 +109,7 @@ fn table(
                 continue;
             }
         }
-        let line = record.position().map_or(line, csv::Position::line);
+        let line = place_of.line(record.position().map_or(begin, csv::Position::byte));
         let (label, count, side) = match columns {
             Some(known) => known,
             None => {
@@ -139,6 +141,34 @@ fn table(
         None => Err(Error::input(format!(
             "{place}: is empty: expected a row for each image"
         ))),
+    }
+}
+
+/// Counts the lines of a text up to places in it, in ascending order.
+struct Lines<'a> {
+    text: &'a [u8],
+    line: usize,
+    place: usize,
+}
+
+impl<'a> Lines<'a> {
+    fn new(text: &'a [u8]) -> Self {
+        Lines {
+            text,
+            line: 1,
+            place: 0,
+        }
+    }
+
+    /// Returns the line of the first thing from a place on, counted from 1.
+    fn line(&mut self, place: u64) -> usize {
+        let from = (place as usize).clamp(self.place, self.text.len());
+        let is_end = |byte: &&u8| matches!(byte, b'\r' | b'\n');
+        let begin = from + self.text[from..].iter().take_while(is_end).count();
+        let passed = &self.text[self.place..begin];
+        self.line += passed.iter().filter(|byte| **byte == b'\n').count();
+        self.place = begin;
+        self.line
     }
 }
 
