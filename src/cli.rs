@@ -6,6 +6,7 @@ mod capacity;
 mod choice;
 mod demo;
 pub mod explain;
+mod import;
 pub mod output;
 mod plot;
 mod process;
@@ -481,6 +482,7 @@ fn run_simulate(args: &SimulateArgs, console: &Console) -> Result<(), Error> {
 fn run_data(command: DataCommand, console: &Console) -> Result<(), Error> {
     let given = |data: Option<&Path>| places(data, std::env::var_os("MORPHCOG_DATA"), None);
     match command {
+        DataCommand::Import(args) => import::run(args, console)?,
         DataCommand::Fetch {
             dataset,
             to,

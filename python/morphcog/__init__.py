@@ -22,6 +22,7 @@ import io as _io
 import json as _json
 import operator as _operator
 import os as _os
+import pathlib as _pathlib
 import sys as _sys
 import threading as _threading
 import time as _time
@@ -37,6 +38,7 @@ from ._morphcog import Error, Unstable, __version__
 __all__ = [
     "Config",
     "Error",
+    "Imported",
     "Robot",
     "Run",
     "Unstable",
@@ -45,6 +47,7 @@ __all__ = [
     "evolve",
     "from_evogym",
     "images",
+    "import_dataset",
     "load_run",
     "stimuli",
 ]
@@ -260,6 +263,93 @@ def images(dataset="builtin", split="train", data=None):
     split: "train" or "test". data: folder with the files (default: MORPHCOG_DATA, then data/<dataset>).
     """
     return _morphcog.images(dataset, split, _path(data))
+
+
+@_dataclass(frozen=True)
+class Imported:
+    """A dataset that was made: its folder, and by the name (or number) of each class a dict of its number and
+    of its training and test images. about: what was done to the images, and which were left out."""
+
+    name: str
+    folder: _pathlib.Path
+    size: tuple
+    classes: dict
+    about: dict
+
+
+def import_dataset(
+    pixels,
+    labels=None,
+    *,
+    name,
+    test_pixels=None,
+    test_labels=None,
+    test=0.2,
+    seed=1,
+    to=None,
+    force=False,
+    size=28,
+    fit="auto",
+    invert=None,
+    transpose=None,
+    quiet=False,
+):
+    """Makes a dataset of images, as `morphcog data import`, and returns what was made.
+
+    pixels: images of one size, (images, rows, columns), also with 1, 3 or 4 channels, as whole numbers from 0
+    to 255, fractions from 0 to 1, or bool; or a list of grey pictures of any size, uint8 (rows, columns).
+    labels: whole numbers or texts, one for each. Without labels, pixels is a path, or several: folders and
+    files as of the command. test_pixels, test_labels: test images; without them, a share test of each class is
+    drawn by seed. to: folder to write (default: data/<name>). force: replaces a dataset there. size, fit, invert
+    and transpose: how pictures are prepared, as the command's options; True and False for its yes and no.
+    """
+    paths, splits = [], []
+    if labels is None:
+        paths = [_path(path) for path in ([pixels] if isinstance(pixels, (str, bytes, _os.PathLike)) else pixels)]
+        if test_pixels is not None or test_labels is not None:
+            raise Error("test_pixels, test_labels: expected pixels and labels with them")
+    else:
+        splits.append((_pictures(pixels, "pixels"), _labels(labels, "labels")))
+        if (test_pixels is None) != (test_labels is None):
+            raise Error("test_pixels, test_labels: expected both or none")
+        if test_pixels is not None:
+            splits.append((_pictures(test_pixels, "test_pixels"), _labels(test_labels, "test_labels")))
+    choices = [None if choice is None else bool(choice) for choice in (invert, transpose)]
+    size, seed = _whole(size, "size", 0), _whole(seed, "seed", 0)
+    with _Progress(quiet) as progress:
+        folder, about = _morphcog.import_dataset(
+            paths, splits, str(name), _path(to), float(test), seed, size, str(fit), choices, bool(force), progress
+        )
+    about = _json.loads(about)
+    classes = {}
+    for found in about.pop("classes"):
+        called = found.pop("name")
+        classes[found["class"] if called is None else called] = found
+    return Imported(about.pop("name"), _pathlib.Path(folder), tuple(about.pop("size")), classes, about)
+
+
+def _pictures(value, what):
+    """Images as one array, or as a list of arrays of different sizes."""
+    try:
+        return _numbers(_np.asarray(value), what, "images, whole numbers or fractions")
+    except ValueError:
+        return [_array(picture, _np.uint8, 2, what, "grey pictures of bytes, (rows, columns)") for picture in value]
+
+
+def _labels(value, what):
+    given = _np.asarray(value)
+    if given.dtype.kind in "UST" or given.dtype.kind == "O" and all(isinstance(one, str) for one in given.flat):
+        return [one.decode() if isinstance(one, bytes) else str(one) for one in given.ravel().tolist()]
+    return _numbers(given, what, "whole numbers or texts, one for each image")
+
+
+def _numbers(given, what, expected):
+    """Numbers in one of the four types that go over the bridge."""
+    if given.dtype.kind not in "biuf":
+        raise Error(f"{what}: expected {expected}, found type {given.dtype}")
+    kinds = {"b": _np.bool_, "f": _np.float64}
+    kind = kinds.get(given.dtype.kind, _np.uint8 if given.dtype == _np.uint8 else _np.int64)
+    return _np.ascontiguousarray(given, dtype=kind)
 
 
 def stimuli(images, config):

@@ -92,6 +92,30 @@ def evolve(
 def images(
     dataset: str = "builtin", split: Literal["train", "test"] = "train", data: _Path | None = None
 ) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.uint8]]: ...
+class Imported:
+    name: str
+    folder: pathlib.Path
+    size: tuple[int, int]
+    classes: dict[str | int, dict[str, int]]
+    about: dict[str, Any]
+
+def import_dataset(
+    pixels: npt.ArrayLike | _Path | Iterable[_Path] | Iterable[npt.ArrayLike],
+    labels: npt.ArrayLike | None = None,
+    *,
+    name: str,
+    test_pixels: npt.ArrayLike | Iterable[npt.ArrayLike] | None = None,
+    test_labels: npt.ArrayLike | None = None,
+    test: float = 0.2,
+    seed: int = 1,
+    to: _Path | None = None,
+    force: bool = False,
+    size: int = 28,
+    fit: Literal["auto", "whole", "content", "keep"] = "auto",
+    invert: bool | None = None,
+    transpose: bool | None = None,
+    quiet: bool = False,
+) -> Imported: ...
 def stimuli(images: npt.ArrayLike, config: Config | _Path) -> _Floats: ...
 def displacements(
     bodies: Iterable[npt.ArrayLike],

@@ -12,12 +12,15 @@ use morphcog::base::stop::Stopped;
 use morphcog::base::threads::{MOST_THREADS, pool};
 use morphcog::body::{Body, Material};
 use morphcog::cli::output::progress::{ProgressWords, Recent, count_line, generation_line};
+use morphcog::commands::data::{self, ImportOptions, ImportSource};
 use morphcog::commands::evolve;
 use morphcog::commands::{audit, eval, replay};
 use morphcog::config;
 use morphcog::config::audit::Criteria;
 use morphcog::data::dataset::{Dataset, DatasetError, Split};
 use morphcog::data::files::places;
+use morphcog::data::import::arrays::{Array, Labelled, Values};
+use morphcog::data::import::{ClassLabel, Fit, InMemory};
 use morphcog::draw::walk::Walk;
 use morphcog::draw::{gif, html};
 use morphcog::robots::selection::Selection;
@@ -34,7 +37,8 @@ use morphcog::task::evaluation::fresh_rollouts;
 use morphcog::task::protocol::{MAX_ROW, MAX_STEPS, Protocol, RolloutMode};
 use morphcog::task::stimulus::stimulus;
 use numpy::{
-    PyArray1, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
+    PyArray1, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArrayDyn,
+    PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyKeyboardInterrupt, PyMemoryError, PyRuntimeError};
 use pyo3::prelude::*;
@@ -674,6 +678,173 @@ fn evolve_run(
     }
 }
 
+/// Numbers or texts of any shape.
+#[derive(FromPyObject)]
+enum Given<'py> {
+    Bools(PyReadonlyArrayDyn<'py, bool>),
+    Bytes(PyReadonlyArrayDyn<'py, u8>),
+    Whole(PyReadonlyArrayDyn<'py, i64>),
+    Real(PyReadonlyArrayDyn<'py, f64>),
+    Texts(Vec<String>),
+}
+
+impl Given<'_> {
+    fn array(&self, name: &str) -> Array {
+        let (shape, values) = match self {
+            Given::Bools(array) => {
+                let values = array
+                    .as_array()
+                    .iter()
+                    .map(|value| u8::from(*value))
+                    .collect();
+                (array.shape().to_vec(), Values::Bools(values))
+            }
+            Given::Bytes(array) => {
+                let values = array.as_array().iter().copied().collect();
+                (array.shape().to_vec(), Values::Bytes(values))
+            }
+            Given::Whole(array) => {
+                let values = array.as_array().iter().copied().collect();
+                (array.shape().to_vec(), Values::Whole(values))
+            }
+            Given::Real(array) => {
+                let values = array.as_array().iter().copied().collect();
+                (array.shape().to_vec(), Values::Real(values))
+            }
+            Given::Texts(texts) => (vec![texts.len()], Values::Texts(texts.clone())),
+        };
+        Array {
+            name: name.to_string(),
+            shape,
+            values,
+        }
+    }
+
+    /// Returns each value as a class; fractions are none.
+    fn classes(&self) -> PyResult<Vec<ClassLabel>> {
+        let array = self.array("labels");
+        let whole = |value: &f64| match value.fract() == 0.0 {
+            true => Ok(ClassLabel::Number(*value as i64)),
+            false => Err(refused(format!(
+                "labels: expected whole numbers or texts, found {value}"
+            ))),
+        };
+        let byte = |value: &u8| ClassLabel::Number((*value).into());
+        match &array.values {
+            Values::Bools(all) | Values::Bytes(all) => Ok(all.iter().map(byte).collect()),
+            Values::Whole(all) => Ok(all.iter().copied().map(ClassLabel::Number).collect()),
+            Values::Real(all) => all.iter().map(whole).collect(),
+            Values::Texts(all) => Ok(all.iter().cloned().map(ClassLabel::Name).collect()),
+        }
+    }
+}
+
+/// Images of a dataset to be, and their labels.
+#[derive(FromPyObject)]
+enum GivenImages<'py> {
+    Array(Given<'py>),
+    /// Grey pictures of any size.
+    Pictures(Vec<PyReadonlyArray2<'py, u8>>),
+}
+
+/// Images with labels of one split; the first is for training if there is a second.
+type GivenSplit<'py> = (GivenImages<'py>, Given<'py>);
+
+fn import_source(paths: Vec<PathBuf>, splits: &[GivenSplit]) -> PyResult<ImportSource> {
+    let mut arrays = Vec::new();
+    let mut pictures = Vec::new();
+    for ((images, labels), (split, prefix)) in splits
+        .iter()
+        .zip([(Split::Train, ""), (Split::Test, "test_")])
+    {
+        let split = (splits.len() > 1).then_some(split);
+        match images {
+            GivenImages::Array(images) => arrays.push(Labelled {
+                images: images.array(&format!("{prefix}pixels")),
+                labels: labels.array(&format!("{prefix}labels")),
+                split,
+            }),
+            GivenImages::Pictures(images) => {
+                let classes = labels.classes()?;
+                if classes.len() != images.len() {
+                    return Err(refused(format!(
+                        "{prefix}labels: has {} labels, expected {}, one for each picture",
+                        classes.len(),
+                        images.len()
+                    )));
+                }
+                pictures.extend(images.iter().zip(classes).map(|(image, class)| {
+                    let view = image.as_array();
+                    let (height, width) = view.dim();
+                    let pixels = Grid::from_fn(height, width, |row, column| view[(row, column)]);
+                    InMemory {
+                        pixels,
+                        class,
+                        split,
+                    }
+                }));
+            }
+        }
+    }
+    match (arrays.is_empty(), pictures.is_empty()) {
+        (true, true) => Ok(ImportSource::Paths(paths)),
+        (false, true) => Ok(ImportSource::Arrays(arrays)),
+        (true, false) => Ok(ImportSource::Pictures(pictures)),
+        (false, false) => Err(refused(
+            "test_pixels: expected an array or a list of pictures, as pixels",
+        )),
+    }
+}
+
+/// Makes a dataset, and returns what was made as JSON; see `morphcog.import_dataset`.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)] // Python's keywords
+fn import_dataset(
+    py: Python,
+    paths: Vec<PathBuf>,
+    splits: Vec<GivenSplit>,
+    name: String,
+    to: Option<PathBuf>,
+    test: f64,
+    seed: u64,
+    size: usize,
+    fit: &str,
+    choices: [Option<bool>; 2],
+    force: bool,
+    listener: &Bound<PyAny>,
+) -> PyResult<(PathBuf, String)> {
+    let _environment = entered()?;
+    let source = import_source(paths, &splits)?;
+    let fit = match fit {
+        "auto" => Fit::Auto,
+        "whole" => Fit::Whole,
+        "content" => Fit::Content,
+        "keep" => Fit::Keep,
+        other => {
+            return Err(refused(format!(
+                "fit={other:?}: expected \"auto\", \"whole\", \"content\" or \"keep\""
+            )));
+        }
+    };
+    let [invert, transpose] = choices;
+    let options = ImportOptions {
+        name,
+        to,
+        test,
+        seed,
+        size,
+        fit,
+        invert,
+        transpose,
+        force,
+    };
+    let made = heard(py, listener, (None, None), |session| {
+        data::import(source, &options, session)
+    })?;
+    let json = serde_json::to_string(&made).expect("names and numbers are JSON");
+    Ok((made.folder, json))
+}
+
 /// Returns images as sensors see them; see `morphcog.stimuli`.
 #[pyfunction]
 fn stimuli<'py>(
@@ -1014,6 +1185,7 @@ fn _morphcog(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<WorldData>()?;
     module.add_function(wrap_pyfunction!(evolve_run, module)?)?;
     module.add_function(wrap_pyfunction!(images, module)?)?;
+    module.add_function(wrap_pyfunction!(import_dataset, module)?)?;
     module.add_function(wrap_pyfunction!(stimuli, module)?)?;
     module.add_function(wrap_pyfunction!(displacements, module)?)?;
     module.add_function(wrap_pyfunction!(command, module)?)?;

@@ -578,3 +578,39 @@ def test_a_wrong_instruction_set_is_refused():
     env = {**os.environ, "MORPHCOG_ISA": "avx1024"}
     said = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=False)
     assert said.returncode == 1 and words in said.stderr.splitlines()[-1], said.stderr
+
+
+def test_arrays_become_a_dataset_that_is_read_as_any_other(tmp_path):
+    generator = np.random.default_rng(1)
+    pixels = generator.integers(0, 255, (20, 8, 8)).astype(np.uint8)
+    pixels[:, 0, 0] = 255
+    labels = np.array(["cat", "dog"])[np.arange(20) % 2]
+    made = mc.import_dataset(pixels, labels, name="pets", to=tmp_path / "pets", quiet=True)
+    assert made.folder == tmp_path / "pets" and made.size == (8, 8)
+    assert made.classes == {
+        "cat": {"class": 0, "train": 8, "test": 2},
+        "dog": {"class": 1, "train": 8, "test": 2},
+    }
+    read, numbers = mc.images("pets", "train", data=made.folder)
+    assert read.shape == (16, 8, 8) and set(numbers) == {0, 1}
+    assert all(any((image == one).all() for one in pixels) for image in read)
+    with pytest.raises(mc.Error, match="force=True"):
+        mc.import_dataset(pixels, labels, name="pets", to=tmp_path / "pets", quiet=True)
+    # Fractions, colours and a split of one's own.
+    colours = np.repeat(pixels[..., None] / 255, 3, axis=-1)
+    whole = np.arange(20) % 2
+    made = mc.import_dataset(
+        colours, whole, name="own", test_pixels=colours[:4], test_labels=whole[:4], to=tmp_path / "own", quiet=True
+    )
+    assert made.classes == {0: {"class": 0, "train": 10, "test": 2}, 1: {"class": 1, "train": 10, "test": 2}}
+    assert (mc.images("own", "train", data=made.folder)[0] == pixels).all()
+    # Pictures of different sizes.
+    pictures = [np.pad(image, number % 3) for number, image in enumerate(pixels)]
+    made = mc.import_dataset(pictures, whole.tolist(), name="some", to=tmp_path / "some", fit="whole", quiet=True)
+    assert made.size == (28, 28) and made.about["fit"] == "whole"
+    for wrong in [{"labels": labels[:3]}, {"name": "mnist"}, {"test": 2}, {"fit": "no"}, {"test_pixels": pixels}]:
+        with pytest.raises(mc.Error):
+            mc.import_dataset(**{"pixels": pixels, "labels": labels, "name": "x", "to": tmp_path / "x", **wrong})
+    with pytest.raises(mc.Error, match="none: cannot be read"):
+        mc.import_dataset(tmp_path / "none", name="x", quiet=True)
+    assert not (tmp_path / "x").exists()

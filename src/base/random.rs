@@ -39,6 +39,8 @@ pub enum Purpose {
     Training = 27,
     /// Image windows that a gait could be trained to look at.
     Windows = 28,
+    /// Split of imported images into training and test images.
+    Import = 29,
 }
 
 /// One stream of random numbers.

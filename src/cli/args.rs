@@ -4,6 +4,7 @@ use crate::cli::audit::AuditArgs;
 use crate::cli::capacity::CapacityArgs;
 use crate::cli::choice::{Archives, ROBOTS, Runs, run_jsons};
 use crate::cli::demo::DemoArgs;
+use crate::cli::import::ImportArgs;
 use crate::cli::output::console::Mode;
 use crate::cli::output::pictures::Format;
 use crate::cli::plot::PlotArgs;
@@ -426,6 +427,16 @@ pub(super) enum DataCommand {
         #[arg(long)]
         force: bool,
     },
+    /// Make a dataset of pictures, arrays or tables of your own.
+    ///
+    /// Images become grey, bright on a dark ground, and of one size. Training and test images are the
+    /// source's own or drawn by the seed. What was done to them is said.
+    #[command(after_help = "\
+Examples:
+  morphcog data import photos/ --name shapes
+  morphcog data import mnist.npz --name mine
+  morphcog data import train.csv test.csv --name letters --to ~/data/letters")]
+    Import(ImportArgs),
     /// Show which files of a dataset are found, and where.
     #[command(
         after_help = "Examples:\n  morphcog data info\n  morphcog data info emnist-digits --data ~/data/emnist"

@@ -1,8 +1,12 @@
-//! `morphcog data`: fetches and describes datasets.
+//! `morphcog data`: fetches, imports and describes datasets.
 
+#[cfg(feature = "import")]
+use crate::base::{error::Error, session::Session};
 use crate::data::catalogue::{Catalogue, known_as};
 use crate::data::dataset::{Dataset, DatasetError, Split};
 use crate::data::files::DatasetPlace;
+#[cfg(feature = "import")]
+pub use crate::data::import::{self, ClassCount, ImportOptions, ImportSource, Imported};
 use crate::data::info::DatasetInfo;
 use std::collections::BTreeMap;
 
@@ -52,6 +56,45 @@ pub(crate) fn info(
         others,
         problems,
     })
+}
+
+/// The contact sheet in the folder of an imported dataset.
+#[cfg(all(feature = "import", feature = "figures"))]
+const SHEET_PNG: &str = "sheet.png";
+
+/// Makes a dataset of pictures, arrays or tables, with a contact sheet of its training images.
+///
+/// # Errors
+/// Reports sources without a dataset in them, and a folder that is taken. Nothing is left then.
+#[cfg(feature = "import")]
+pub fn import(
+    source: ImportSource,
+    options: &ImportOptions,
+    session: &Session,
+) -> Result<Imported, Error> {
+    let staged = import::stage(source, options, session)?;
+    #[cfg(feature = "figures")]
+    draw_sheet(&staged, &options.name)?;
+    session.check()?;
+    staged.commit()
+}
+
+#[cfg(all(feature = "import", feature = "figures"))]
+fn draw_sheet(staged: &import::Staged, name: &str) -> Result<(), Error> {
+    use crate::data::files::places;
+    use crate::draw::sheet;
+    /// Images of each class.
+    const SAMPLES: usize = 16;
+    let places = places(Some(staged.path()), None, None);
+    let dataset = Dataset::load(name, &places, &[Split::Train])?;
+    let sheet =
+        sheet::contact_sheet(&dataset, Split::Train, SAMPLES).and_then(|sheet| sheet::png(&sheet));
+    match sheet {
+        Ok(png) => staged.write(SHEET_PNG, &png),
+        // Of many classes of large images there is none.
+        Err(sheet::SheetError::Size { .. }) => Ok(()),
+        Err(error) => Err(Error::other(error.to_string())),
+    }
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ pub mod audit;
 pub mod bench;
 pub mod capacity;
 pub(crate) mod collect;
-pub(crate) mod data;
+pub mod data;
 pub mod eval;
 pub mod evolve;
 pub(crate) mod pairs;

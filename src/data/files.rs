@@ -279,11 +279,14 @@ fn is_emnist(dataset: &str, place: &DatasetPlace, image_file: &Path) -> bool {
         .unwrap_or_else(|_| place.path.clone());
     let folder = folder.file_name().filter(|_| !FETCHABLE.contains(&dataset));
     let names = [Some(dataset.as_ref()), image_file.file_name(), folder];
-    names.into_iter().flatten().any(|name| {
-        let name = name.to_string_lossy();
-        name.split(|c: char| !c.is_ascii_alphanumeric())
-            .any(|word| word.eq_ignore_ascii_case("emnist"))
-    })
+    let mut names = names.into_iter().flatten();
+    names.any(|name| names_emnist(&name.to_string_lossy()))
+}
+
+/// True if EMNIST is a word of a name.
+pub(crate) fn names_emnist(name: &str) -> bool {
+    name.split(|c: char| !c.is_ascii_alphanumeric())
+        .any(|word| word.eq_ignore_ascii_case("emnist"))
 }
 
 /// Returns the standard names (without .gz) of a split's images or labels, the most common first.

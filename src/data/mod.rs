@@ -8,6 +8,8 @@ pub(crate) mod description;
 pub mod fetch;
 pub mod files;
 pub(crate) mod idx;
+#[cfg(feature = "import")]
+pub mod import;
 pub(crate) mod info;
 pub(crate) mod pen;
 pub(crate) mod strokes;

@@ -102,7 +102,7 @@ pub(crate) fn write_png(file: &Path, picture: &Grid<u8>) -> Result<(), SheetErro
     })
 }
 
-fn png(picture: &Grid<u8>) -> Result<Vec<u8>, SheetError> {
+pub(crate) fn png(picture: &Grid<u8>) -> Result<Vec<u8>, SheetError> {
     let error = |what: &dyn std::fmt::Display| SheetError::Png(what.to_string());
     let size = u32::try_from(picture.width())
         .ok()

@@ -201,6 +201,37 @@ impl Sandbox {
     }
 }
 
+/// Writes a folder of grey PNGs: bars upright and across, dark on a bright ground, of several sizes;
+/// and one that is broken.
+pub fn write_pictures(sandbox: &Sandbox, folder: &str, count: u32) {
+    for number in 0..count {
+        for (class, is_upright) in [("up", true), ("across", false)] {
+            let (width, height, at) = (60 + number, 50, 20 + number % 9);
+            let is_ink = |row: u32, column: u32| match is_upright {
+                true => (at..at + 5).contains(&column) && (8..40).contains(&row),
+                false => (at..at + 5).contains(&row) && (8..40).contains(&column),
+            };
+            let pixels: Vec<u8> = (0..width * height)
+                .map(|place| {
+                    if is_ink(place / width, place % width) {
+                        20
+                    } else {
+                        230
+                    }
+                })
+                .collect();
+            let mut bytes = Vec::new();
+            let mut encoder = png::Encoder::new(&mut bytes, width, height);
+            encoder.set_color(png::ColorType::Grayscale);
+            let mut writer = encoder.write_header().unwrap();
+            writer.write_image_data(&pixels).unwrap();
+            writer.finish().unwrap();
+            sandbox.write(&format!("{folder}/{class}/{number}.png"), bytes);
+        }
+    }
+    sandbox.write(&format!("{folder}/across/broken.png"), "no picture");
+}
+
 /// Writes an IDX dataset of zeros and ones, in files whose paths begin with `prefix`: noise, of
 /// seed `seed`, with a bar, which is upright in zeros.
 pub fn write_images(sandbox: &Sandbox, prefix: &str, [height, width]: [usize; 2], seed: u8) {

@@ -1,6 +1,6 @@
 //! Datasets: what is missing or broken.
 
-use crate::common::program::{PROGRAM, Sandbox, said, write_images};
+use crate::common::program::{PROGRAM, Sandbox, said, write_images, write_pictures};
 
 #[test]
 fn missing_data_are_refused_naming_file_place_and_remedy() {
@@ -254,4 +254,50 @@ fn images_that_do_not_fit_into_memory_are_an_error_and_no_abort() {
         assert_eq!(output.status.code(), Some(3), "{said}");
         assert!(said.contains("train-images-idx3-ubyte: "), "{said}");
     }
+}
+
+#[test]
+fn a_folder_of_pictures_becomes_a_dataset_like_any_other() {
+    let sandbox = Sandbox::new();
+    write_pictures(&sandbox, "photos", 10);
+    let import = "data import photos --name shapes";
+    let made = sandbox
+        .run(import)
+        .ended(0, &["left out: across/broken.png"]);
+    for part in ["across", "inverted", "wrote data/shapes"] {
+        assert!(made.out.contains(part), "{part}: {made:?}");
+    }
+    let next = "next: morphcog train --pairs --dataset shapes";
+    assert!(made.err.lines().any(|line| line == next), "{made:?}");
+    let info = sandbox.run("data info shapes").ended(0, &[]).out;
+    for part in ["train: 16 images of 28 × 28", "test: 4 images of 28 × 28"] {
+        assert!(info.contains(part), "{part}: {info}");
+    }
+    assert!(sandbox.read("data/shapes/images.csv").contains("up/9.png"));
+    assert!(
+        std::fs::read(sandbox.path("data/shapes/sheet.png"))
+            .unwrap()
+            .starts_with(b"\x89PNG")
+    );
+    // It is there once, and is replaced if that is asked for.
+    sandbox.run(import).ended(5, &["data/shapes", "--force"]);
+    sandbox
+        .run(&format!("{import} --force --seed 2"))
+        .ended(0, &[]);
+    let elsewhere = sandbox.run(&format!("{import} --to a/b")).ended(0, &[]);
+    assert!(
+        elsewhere.err.contains("--dataset shapes --data a/b"),
+        "{elsewhere:?}"
+    );
+    sandbox
+        .run(&format!("{import}2 --fit keep --invert no"))
+        .ended(3, &["--fit"]);
+    sandbox
+        .run("data import nothing --name x")
+        .ended(3, &["nothing"]);
+    sandbox
+        .run("data import photos --name builtin")
+        .ended(2, &["--name builtin"]);
+    let kept: Vec<_> = std::fs::read_dir(sandbox.path("data")).unwrap().collect();
+    assert_eq!(kept.len(), 1, "{kept:?}");
 }

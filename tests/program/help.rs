@@ -5,7 +5,7 @@ use morphcog::commands::plan::PAPER_TOML;
 use morphcog::commands::schema;
 use morphcog::config::BUILT_IN;
 
-const COMMANDS: [&str; 25] = [
+const COMMANDS: [&str; 26] = [
     "",
     "evolve",
     "response",
@@ -22,6 +22,7 @@ const COMMANDS: [&str; 25] = [
     "simulate",
     "data",
     "data fetch",
+    "data import",
     "data info",
     "data sheet",
     "serve",
@@ -88,6 +89,11 @@ fn a_wrong_command_line_ends_with_2() {
         "simulate",
         "data",
         "data sheet --samples x",
+        "data import",
+        "data import photos",
+        "data import photos --name mnist",
+        "data import photos --name shapes --test 1",
+        "data import photos --name shapes --fit tight",
         "completions csh",
         "config zero_one.toml --unknown",
         "plot bodies",

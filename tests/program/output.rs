@@ -375,6 +375,10 @@ fn every_event_of_json_is_documented_with_its_fields() {
                  train.final_images=4 --set train.challengers=1 --set protocol.control_steps=50 --set \
                  validation.images=40 --set validation.best=0";
     let mut seen = BTreeSet::new();
+    sandbox.write(
+        "own.csv",
+        "0,0,9,0,255\n0,9,0,0,255\n1,0,9,255,0\n1,9,0,255,0\n",
+    );
     for args in [
         "evolve -c tiny.toml -o new",
         train,
@@ -388,6 +392,7 @@ fn every_event_of_json_is_documented_with_its_fields() {
         "report run --rollouts 0",
         "data info",
         "data sheet",
+        "data import own.csv --name own --fit keep",
         "gallery",
         "sweep plan.toml",
         "sweep plan.toml --status",

@@ -4,7 +4,7 @@
 //! hold what is done, and which file, key or number is named. After a change that is meant, `UPDATE_SNAPSHOTS=1 cargo test --release --test program snapshots` writes them anew; the
 //! difference is reviewed with the change.
 
-use crate::common::program::{PROGRAM, Sandbox, TINY, gaits, write_images};
+use crate::common::program::{PROGRAM, Sandbox, TINY, gaits, write_images, write_pictures};
 use crate::with_run;
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ fn folder() -> PathBuf {
 }
 
 /// Units before which a number depends on the machine.
-const UNITS: [&str; 9] = [
+const UNITS: [&str; 10] = [
     "s",
     "ms",
     "min",
@@ -22,6 +22,7 @@ const UNITS: [&str; 9] = [
     "evaluations/s",
     "rollouts/s",
     "rollouts/s,",
+    "images/s",
     "s;",
 ];
 
@@ -148,6 +149,7 @@ fn help_reads_as_it_was_reviewed() {
             ("help-simulate", "simulate --help"),
             ("help-serve", "serve --help"),
             ("help-data-fetch", "data fetch --help"),
+            ("help-data-import", "data import --help"),
             ("help-bench", "bench --help"),
         ],
     );
@@ -157,6 +159,7 @@ fn help_reads_as_it_was_reviewed() {
 fn results_read_as_they_were_reviewed() {
     let sandbox = with_run();
     sandbox.write("plan.toml", "config = \"tiny.toml\"\nseeds = [1, 2]\n");
+    write_pictures(&sandbox, "photos", 6);
     check_all(
         &sandbox,
         &[
@@ -171,6 +174,8 @@ fn results_read_as_they_were_reviewed() {
             ),
             ("gallery", "gallery"),
             ("data-info", "data info builtin"),
+            ("data-import", "data import photos --name shapes"),
+            ("error-import", "data import photos --name shapes"),
             (
                 "sweep-list",
                 "sweep plan.toml --out sweep --list --threads 1",
