@@ -319,7 +319,7 @@ fn warn_of_unmeasured(gaits: &Gaits, console: &Console) -> Result<(), Error> {
             "{} of these gaits are not measured yet; before the others start, run: morphcog response \
              --archive {archive} --robots {} --images {} --error 0",
             unmeasured.robots.len(),
-            quoted(&unmeasured.robots.join(",")),
+            quoted(unmeasured.robots.join(",")),
             unmeasured.rollouts
         ));
     }
@@ -339,11 +339,11 @@ fn words(options: &PairsOptions, classes: &[String]) -> Result<Vec<String>, Erro
         };
         words.extend(["--archive".to_string(), named]);
     }
-    words.extend(["--robots".to_string(), quoted(&options.robots.to_string())]);
+    words.extend(["--robots".to_string(), quoted(options.robots.to_string())]);
     let dataset = options.dataset.iter();
     words.extend(dataset.flat_map(|name| ["--dataset".to_string(), quoted(name)]));
     if !classes.is_empty() {
-        words.extend(["--classes".to_string(), quoted(&classes.join(","))]);
+        words.extend(["--classes".to_string(), quoted(classes.join(","))]);
     }
     let seed = options.seed.iter();
     words.extend(seed.flat_map(|seed| ["--seed".to_string(), seed.to_string()]));

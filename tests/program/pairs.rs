@@ -138,3 +138,72 @@ fn what_cannot_be_paired_is_refused_before_anything_is_measured() {
         assert!(!sandbox.path("none").exists());
     }
 }
+
+/// Writes a picture of a shape, dark on bright, of an odd size, somewhere in it.
+fn draw(sandbox: &Sandbox, name: &str, class: usize, number: usize) {
+    let noise = |salt: usize| {
+        let mixed = (number * 31 + class * 7 + salt * 101 + 1) as u32;
+        (mixed.wrapping_mul(2_654_435_761) >> 8) as usize
+    };
+    let [height, width] = [noise(1), noise(2)].map(|noise| 31 + noise % 40);
+    let radius = height.min(width) as f64 * (0.28 + (noise(3) % 12) as f64 / 100.0);
+    let at = |side: usize, noise: usize| {
+        radius + 1.0 + (side as f64 - 2.0 * radius - 2.0) * (noise % 100) as f64 / 100.0
+    };
+    let (row, column) = (at(height, noise(4)), at(width, noise(5)));
+    let is_ink = |y: usize, x: usize| {
+        let (dy, dx) = ((y as f64 - row) / radius, (x as f64 - column) / radius);
+        let (from, inside) = match class {
+            0 => ((dy * dy + dx * dx).sqrt(), 0.7),
+            1 => (dy.abs().max(dx.abs()) * 1.2, 0.7),
+            _ => (dy.max(1.7 * dx.abs() - dy), 0.5),
+        };
+        (inside..=1.0).contains(&from)
+    };
+    let pixels: Vec<u8> = (0..height * width)
+        .map(|place| {
+            if is_ink(place / width, place % width) {
+                20
+            } else {
+                240
+            }
+        })
+        .collect();
+    let path = sandbox.path(&format!("pictures/{name}/{number}.png"));
+    std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+    let file = std::fs::File::create(path).unwrap();
+    let mut encoder = png::Encoder::new(file, width as u32, height as u32);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder
+        .write_header()
+        .unwrap()
+        .write_image_data(&pixels)
+        .unwrap();
+}
+
+#[test]
+fn a_folder_of_pictures_becomes_a_team_that_reads_those_it_has_not_seen() {
+    let sandbox = Sandbox::new();
+    for (class, name) in ["circle", "square", "triangle"].iter().enumerate() {
+        (0..30).for_each(|number| draw(&sandbox, name, class, number));
+    }
+    sandbox
+        .run("data import -q pictures --name shapes")
+        .ended(0, &[]);
+    let small = "--set train.windows=60 --set train.rounds=1 --set train.images=20 --set train.challengers=0 \
+                 --set train.final_images=20 --set validation.best=0";
+    sandbox
+        .run(&format!(
+            "train -q --pairs --dataset shapes -a gallery:gaits-6 --robots b8dbee52c6 {small}"
+        ))
+        .ended(0, &[]);
+    let said = sandbox
+        .run("team -q --archive runs/shapes-team --images all")
+        .ended(0, &[]);
+    let team: Value = serde_json::from_str(&sandbox.read("runs/shapes-team/team.json")).unwrap();
+    let accuracy = team["answers"]["votes"]["accuracy"]["accuracy"]
+        .as_f64()
+        .unwrap();
+    assert!(accuracy >= 0.8, "{accuracy}: {}", said.out);
+    assert!(said.out.contains("circle|square"), "{}", said.out);
+}
