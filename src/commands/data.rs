@@ -13,6 +13,8 @@ use std::collections::BTreeMap;
 #[derive(Debug)]
 pub(crate) struct FoundDataset {
     pub(crate) info: DatasetInfo,
+    /// Names of the classes, from class 0; empty if they have numbers only.
+    pub(crate) class_names: Vec<String>,
     /// Names of its files that are identical to the published ones.
     pub(crate) published: Vec<String>,
     /// Splits that belong to a dataset known by another name, with that name.
@@ -28,13 +30,17 @@ pub(crate) fn info(
     transpose: Option<bool>,
 ) -> Result<FoundDataset, DatasetError> {
     let mut info: Option<DatasetInfo> = None;
+    let mut class_names = Vec::new();
     let mut problems = Vec::new();
     for split in Split::ALL {
         match Dataset::oriented(name, given, &[split], transpose) {
-            Ok(dataset) => match &mut info {
-                Some(info) => info.splits.extend(dataset.info().splits),
-                None => info = Some(dataset.info()),
-            },
+            Ok(dataset) => {
+                class_names = dataset.class_names().to_vec();
+                match &mut info {
+                    Some(info) => info.splits.extend(dataset.info().splits),
+                    None => info = Some(dataset.info()),
+                }
+            }
             Err(problem) => problems.push((split, problem)),
         }
     }
@@ -52,6 +58,7 @@ pub(crate) fn info(
     let others = known.filter(|(_, known)| *known != name).collect();
     Ok(FoundDataset {
         info,
+        class_names,
         published,
         others,
         problems,

@@ -396,6 +396,12 @@ pub(crate) fn dataset(console: &Console, found: &FoundDataset) {
         if let (Some(event), false) = (event.as_object_mut(), found.others.is_empty()) {
             event.insert("known_as".to_string(), serde_json::json!(found.others));
         }
+        if let (Some(event), false) = (event.as_object_mut(), found.class_names.is_empty()) {
+            event.insert(
+                "class_names".to_string(),
+                serde_json::json!(found.class_names),
+            );
+        }
         return console.event("dataset", &event);
     }
     console.line(&format!("{}: {} ({})", info.name, info.source, info.origin));
@@ -419,13 +425,23 @@ pub(crate) fn dataset(console: &Console, found: &FoundDataset) {
                 file.name, file.bytes, file.sha256
             ));
         }
-        rows.extend(
-            images.per_class.iter().map(|(class, count)| {
-                vec![split.to_string(), class.to_string(), count.to_string()]
-            }),
-        );
+        rows.extend(images.per_class.iter().map(|(class, count)| {
+            let name = found.class_names.get(usize::from(*class));
+            let name = name.cloned().unwrap_or_default();
+            vec![
+                split.to_string(),
+                class.to_string(),
+                name,
+                count.to_string(),
+            ]
+        }));
     }
-    console.table(&["split", "class", "images"], &rows);
+    let mut headers = vec!["split", "class", "name", "images"];
+    if found.class_names.is_empty() {
+        headers.remove(2);
+        rows.iter_mut().for_each(|row| drop(row.remove(2)));
+    }
+    console.table(&headers, &rows);
     for (split, known) in &found.others {
         console.warning(&format!(
             "{split}: these are the images of {known}, here under the name {}",

@@ -57,7 +57,7 @@ pub struct Array {
 
 /// Images with their labels, as the caller has them in memory.
 #[derive(Clone, Debug)]
-pub struct Labelled {
+pub struct LabelledArrays {
     /// The images.
     pub images: Array,
     /// One number or text for each image.

@@ -28,7 +28,7 @@ use crate::data::dataset::BUILTIN;
 use crate::data::description::Description;
 use crate::data::files::{check_name, default_folder};
 use crate::data::idx;
-use crate::data::import::arrays::{Labelled, Pair};
+use crate::data::import::arrays::{LabelledArrays, Pair};
 use crate::data::import::classes::Classes;
 use crate::data::import::item::{Found, Grey, Item, Label, Part, Picture};
 use crate::data::import::prepare::{Facts, Plan};
@@ -135,7 +135,7 @@ pub enum ImportSource {
     /// Folders and files.
     Paths(Vec<PathBuf>),
     /// Arrays in memory.
-    Arrays(Vec<Labelled>),
+    Arrays(Vec<LabelledArrays>),
     /// Pictures of any size in memory.
     Pictures(Vec<InMemory>),
 }
@@ -337,8 +337,8 @@ fn check_apart(sources: &[PathBuf], folder: &Path) -> Result<(), Error> {
     }
 }
 
-fn paired(arrays: Vec<Labelled>) -> Vec<Pair> {
-    let pair = |labelled: Labelled| Pair {
+fn paired(arrays: Vec<LabelledArrays>) -> Vec<Pair> {
+    let pair = |labelled: LabelledArrays| Pair {
         part: labelled.split.map(Part::from),
         images: labelled.images,
         labels: labelled.labels,
@@ -1298,7 +1298,7 @@ mod tests {
                 .map(|label| format!("class {label}"))
                 .collect(),
         );
-        let labelled = Labelled {
+        let labelled = LabelledArrays {
             images: array("pixels", &[10, 4, 4], Values::Bytes(pixels)),
             labels: array("labels", &[10], names),
             split: None,

@@ -273,7 +273,7 @@ pub(crate) fn of_channels(
     };
     let mut pixels: Vec<u8> = bytes.chunks_exact(channels).map(luma).collect();
     let mut is_cut_out = false;
-    if channels % 2 == 0 {
+    if channels.is_multiple_of(2) {
         let alphas = || bytes.iter().skip(channels - 1).step_by(channels).copied();
         is_cut_out = alphas().any(|alpha| alpha < 255);
         let weight: u64 = alphas().map(u64::from).sum();
