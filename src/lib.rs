@@ -17,7 +17,7 @@
 //! | 2 | [`genome`] | CPPNs and their mutations | [`genome::Genome`] |
 //! | 2 | [`qd`] | archives and MAP-Elites over any type of solution | [`qd::map_elites`] |
 //! | 2 | [`baseline`] | networks that robots are compared with | [`baseline::train`] |
-//! | 2 | [`data`] | the IDX reader, datasets, drawn digits | [`data::dataset::Dataset`] |
+//! | 2 | [`data`] | datasets: IDX files, imports, drawn digits | [`data::dataset::Dataset`] |
 //! | 3 | [`task`] | stimuli, protocols, rollouts, answers and scores | [`task::evaluation`] |
 //! | 4 | [`response`] | how a gait responds, and what training could reach with it | [`response::gait::Gait`] |
 //! | 5 | [`config`] | everything a run depends on; errors with line and key | [`config::Config`] |

@@ -19,7 +19,7 @@ use morphcog::config;
 use morphcog::config::audit::Criteria;
 use morphcog::data::dataset::{Dataset, DatasetError, Split};
 use morphcog::data::files::places;
-use morphcog::data::import::arrays::{Array, Labelled, Values};
+use morphcog::data::import::arrays::{Array, LabelledArrays, Values};
 use morphcog::data::import::{ClassLabel, Fit, InMemory};
 use morphcog::draw::walk::Walk;
 use morphcog::draw::{gif, html};
@@ -759,7 +759,7 @@ fn import_source(paths: Vec<PathBuf>, splits: &[GivenSplit]) -> PyResult<ImportS
     {
         let split = (splits.len() > 1).then_some(split);
         match images {
-            GivenImages::Array(images) => arrays.push(Labelled {
+            GivenImages::Array(images) => arrays.push(LabelledArrays {
                 images: images.array(&format!("{prefix}pixels")),
                 labels: labels.array(&format!("{prefix}labels")),
                 split,

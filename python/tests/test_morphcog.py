@@ -583,7 +583,9 @@ def test_a_wrong_instruction_set_is_refused():
 def test_arrays_become_a_dataset_that_is_read_as_any_other(tmp_path):
     generator = np.random.default_rng(1)
     pixels = generator.integers(0, 255, (20, 8, 8)).astype(np.uint8)
-    pixels[:, 0, 0] = 255
+    pixels[:, [0, -1]] = 0  # a dark ground: nothing is inverted
+    pixels[:, :, [0, -1]] = 0
+    pixels[:, 3, 3] = 255
     labels = np.array(["cat", "dog"])[np.arange(20) % 2]
     made = mc.import_dataset(pixels, labels, name="pets", to=tmp_path / "pets", quiet=True)
     assert made.folder == tmp_path / "pets" and made.size == (8, 8)

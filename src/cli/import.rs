@@ -31,7 +31,7 @@ pub(super) struct ImportArgs {
     /// Seed of the draw of these.
     #[arg(long, default_value_t = 1, value_parser = seed())]
     seed: u64,
-    /// Side of the images made of pictures \[pixels\].
+    /// Side of the images made of pictures, in pixels.
     #[arg(long, value_name = "PIXELS", default_value_t = 28, value_parser = whole::<usize>(4..=512))]
     size: usize,
     /// How pictures are fitted into that (auto: small ones of one size are kept).

@@ -1,4 +1,4 @@
-//! Images: the IDX reader, places and sources of datasets, and the digits that the program draws.
+//! Images: IDX files, places and sources of datasets, imports, and the digits that the program draws.
 
 pub(crate) mod builtin;
 pub mod catalogue;

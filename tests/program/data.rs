@@ -270,7 +270,13 @@ fn a_folder_of_pictures_becomes_a_dataset_like_any_other() {
     let next = "next: morphcog train --pairs --dataset shapes";
     assert!(made.err.lines().any(|line| line == next), "{made:?}");
     let info = sandbox.run("data info shapes").ended(0, &[]).out;
-    for part in ["train: 16 images of 28 × 28", "test: 4 images of 28 × 28"] {
+    let parts = [
+        "train: 16 images of 28 × 28",
+        "test: 4 images of 28 × 28",
+        "split  class  name",
+        "train      1  up",
+    ];
+    for part in parts {
         assert!(info.contains(part), "{part}: {info}");
     }
     assert!(sandbox.read("data/shapes/images.csv").contains("up/9.png"));

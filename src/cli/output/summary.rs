@@ -448,12 +448,18 @@ pub(crate) fn dataset(console: &Console, found: &FoundDataset) {
         rows.extend(images.per_class.iter().map(|(class, count)| {
             vec![
                 split.to_string(),
-                class_names.name(*class),
+                class.to_string(),
+                class_names.given(*class).unwrap_or_default().to_string(),
                 count.to_string(),
             ]
         }));
     }
-    console.table(&["split", "class", "images"], &rows);
+    let mut headers = vec!["split", "class", "name", "images"];
+    if class_names.all().is_empty() {
+        headers.remove(2);
+        rows.iter_mut().for_each(|row| drop(row.remove(2)));
+    }
+    console.table(&headers, &rows);
     for (split, known) in &found.others {
         console.warning(&format!(
             "{split}: these are the images of {known}, here under the name {}",

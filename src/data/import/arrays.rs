@@ -57,7 +57,7 @@ pub struct Array {
 
 /// Images with their labels, as the caller has them in memory.
 #[derive(Clone, Debug)]
-pub struct Labelled {
+pub struct LabelledArrays {
     /// The images.
     pub images: Array,
     /// One number or text for each image.
@@ -179,6 +179,7 @@ pub(crate) enum Scale {
 /// Returns the scale of all pixels together: a split of dark images alone would mislead.
 pub(crate) fn scale<'a>(all: impl Iterator<Item = &'a Array>) -> Result<Scale, Error> {
     let mut most = 0.0_f64;
+    let mut fractions = None;
     for array in all {
         let [least, largest] = match &array.values {
             Values::Bools(values) | Values::Bytes(values) => {
@@ -204,6 +205,15 @@ pub(crate) fn scale<'a>(all: impl Iterator<Item = &'a Array>) -> Result<Scale, E
             ));
         }
         most = most.max(largest);
+        if largest <= 1.0 && matches!(array.values, Values::Real(_)) {
+            fractions = Some(array);
+        }
+    }
+    if let Some(array) = fractions.filter(|_| most > 1.0) {
+        return Err(Error::input(format!(
+            "{}: has pixels from 0 to 1, other images have pixels from 0 to {most}: expected one scale",
+            array.name
+        )));
     }
     Ok(match most <= 1.0 {
         true => Scale::Unit,

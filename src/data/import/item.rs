@@ -92,7 +92,9 @@ impl Part {
     /// Returns the part that a file, a folder or an array is named after, such as `mnist_train`.
     pub(crate) fn named(name: &str) -> Option<Self> {
         let lower = name.to_lowercase();
-        let mut words = lower.split(|c: char| !c.is_alphanumeric());
+        // The file's own name goes before its folder's.
+        let names = lower.rsplit('/');
+        let mut words = names.flat_map(|name| name.split(|c: char| !c.is_alphanumeric()));
         words.find_map(|word| match word {
             _ if word.starts_with("train") => Some(Part::Train),
             "t10k" => Some(Part::Test),
@@ -266,6 +268,8 @@ mod tests {
             ("train-00000-of-00002.parquet", Some(Part::Train)),
             ("validation-0.parquet", Some(Part::Validation)),
             ("sign_mnist_test.csv", Some(Part::Test)),
+            ("testing/x_train.npy", Some(Part::Train)),
+            ("test/0.npy", Some(Part::Test)),
             ("contests.csv", None),
             ("images", None),
         ];

@@ -28,7 +28,7 @@ use crate::data::dataset::BUILTIN;
 use crate::data::description::Description;
 use crate::data::files::{check_name, default_folder};
 use crate::data::idx;
-use crate::data::import::arrays::{Labelled, Pair};
+use crate::data::import::arrays::{LabelledArrays, Pair};
 use crate::data::import::classes::Classes;
 use crate::data::import::item::{Found, Grey, Item, Label, Part, Picture};
 use crate::data::import::prepare::{Facts, Plan};
@@ -135,7 +135,7 @@ pub enum ImportSource {
     /// Folders and files.
     Paths(Vec<PathBuf>),
     /// Arrays in memory.
-    Arrays(Vec<Labelled>),
+    Arrays(Vec<LabelledArrays>),
     /// Pictures of any size in memory.
     Pictures(Vec<InMemory>),
 }
@@ -337,8 +337,8 @@ fn check_apart(sources: &[PathBuf], folder: &Path) -> Result<(), Error> {
     }
 }
 
-fn paired(arrays: Vec<Labelled>) -> Vec<Pair> {
-    let pair = |labelled: Labelled| Pair {
+fn paired(arrays: Vec<LabelledArrays>) -> Vec<Pair> {
+    let pair = |labelled: LabelledArrays| Pair {
         part: labelled.split.map(Part::from),
         images: labelled.images,
         labels: labelled.labels,
@@ -505,7 +505,9 @@ fn check_classes_left(found: &Found, read: &[Read], classes: &Classes) -> Result
         None => Ok(()),
         Some((label, _)) => {
             let text = format!("no image of the class {label} can be read");
-            let first = found.refused.first();
+            let folder = label.to_string();
+            let is_of = |refused: &&Refused| refused.source.split('/').any(|name| name == folder);
+            let first = found.refused.iter().find(is_of).or(found.refused.first());
             let why = first.map(|refused| format!("; {} {}", refused.source, refused.reason));
             Err(Error::input(text + &why.unwrap_or_default()))
         }
@@ -1031,18 +1033,18 @@ mod tests {
         place.put("idx/train-answers", &idx(&[10], &labels));
         place.put("idx/t10k-pixels", &idx(&[4, 4, 4], &test));
         place.put("idx/t10k-answers", &idx(&[4], &of_test));
-        let real: Vec<u8> = pixels
-            .iter()
-            .flat_map(|p| (f64::from(*p) / 255.0).to_le_bytes())
-            .collect();
+        let real = |pixels: &[u8]| -> Vec<u8> {
+            let share = |pixel: &u8| (f64::from(*pixel) / 255.0).to_le_bytes();
+            pixels.iter().flat_map(share).collect()
+        };
         let names =
             |labels: &[u8]| -> Vec<u8> { labels.iter().map(|label| b'0' + label).collect() };
         place.put(
             "f.npz",
             &npz(&[
-                ("train_images", npy("<f8", &[10, 16], &real)),
+                ("train_images", npy("<f8", &[10, 16], &real(&pixels))),
                 ("train_labels", npy("|S1", &[10, 1], &names(&labels))),
-                ("test_images", npy("|u1", &[4, 4, 4, 1], &test)),
+                ("test_images", npy("<f8", &[4, 4, 4, 1], &real(&test))),
                 ("test_labels", yt),
             ]),
         );
@@ -1060,10 +1062,7 @@ mod tests {
             all.push(files.map(|file| place.bytes(&format!("out/{source}/{file}"))));
         }
         assert_eq!(all[0][0][16..], pixels);
-        for (number, other) in all.iter().enumerate() {
-            // Bytes and fractions together are refused or of one scale, so these are darker.
-            assert!(number == 4 || *other == all[0], "{number}");
-        }
+        assert!(all.iter().all(|other| *other == all[0]));
     }
 
     #[test]
@@ -1204,6 +1203,15 @@ mod tests {
             &["sizes.npz"],
             "training images have 4 × 4 pixels, test images 5 × 5",
         );
+        let share = npy("<f8", &[2, 4, 4], &[0; 256]);
+        let mixed = [
+            ("x_train", npy("|u1", &[4, 4, 4], &pixels)),
+            ("y_train", npy("|u1", &[4], &labels)),
+            ("x_test", share),
+            ("y_test", npy("|u1", &[2], &labels[..2])),
+        ];
+        place.put("mixed.npz", &npz(&mixed));
+        place.refused(&["mixed.npz"], "expected one scale");
         let whole = ImportOptions {
             fit: Fit::Whole,
             ..place.options("whole")
@@ -1290,7 +1298,7 @@ mod tests {
                 .map(|label| format!("class {label}"))
                 .collect(),
         );
-        let labelled = Labelled {
+        let labelled = LabelledArrays {
             images: array("pixels", &[10, 4, 4], Values::Bytes(pixels)),
             labels: array("labels", &[10], names),
             split: None,

@@ -4,7 +4,7 @@ use crate::base::error::Error;
 use crate::base::files::open_file;
 use crate::data::import::item::{Found, Item, Label, Part, Picture, Refused};
 use parquet::basic::{ConvertedType, Type as Physical};
-use parquet::file::metadata::FileMetaData;
+use parquet::file::metadata::{FileMetaData, RowGroupMetaData};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::{Field, Row};
 use parquet::schema::types::Type;
@@ -17,6 +17,15 @@ const LABELS: [&str; 4] = ["label", "labels", "fine_label", "class"];
 
 /// Reads the images of a file; `name` is its path below the source.
 pub(crate) fn read(path: &Path, name: &str, part: Option<Part>) -> Result<Found, Error> {
+    // The library panics at some broken files; none leaves anything behind.
+    let read = std::panic::catch_unwind(|| rows(path, name, part));
+    read.unwrap_or_else(|_| {
+        let text = format!("{}: is no whole Parquet file", path.display());
+        Err(Error::input(text))
+    })
+}
+
+fn rows(path: &Path, name: &str, part: Option<Part>) -> Result<Found, Error> {
     let place = path.display();
     let failed = |text: String| Error::input(format!("{place}: {text}"));
     let broken = |error: parquet::errors::ParquetError| {
@@ -29,6 +38,11 @@ pub(crate) fn read(path: &Path, name: &str, part: Option<Part>) -> Result<Found,
     };
     let file = open_file(path).map_err(|error| Error::reading(path, &error))?;
     let reader = SerializedFileReader::new(file).map_err(broken)?;
+    if !reader.metadata().row_groups().iter().all(is_sound) {
+        return Err(failed(
+            "is no whole Parquet file: its columns lie outside of it".to_string(),
+        ));
+    }
     let metadata = reader.metadata().file_metadata();
     let schema = metadata.schema();
     let (image, label) = columns(schema).map_err(failed)?;
@@ -64,6 +78,17 @@ pub(crate) fn read(path: &Path, name: &str, part: Option<Part>) -> Result<Found,
         }
     }
     Ok(found)
+}
+
+/// True if the places of columns are none before the file's beginning.
+fn is_sound(group: &RowGroupMetaData) -> bool {
+    group.columns().iter().all(|column| {
+        let offsets = [
+            Some(column.data_page_offset()),
+            column.dictionary_page_offset(),
+        ];
+        column.compressed_size() >= 0 && offsets.into_iter().flatten().all(|offset| offset >= 0)
+    })
 }
 
 /// Returns the names of the columns of pictures and of labels.
