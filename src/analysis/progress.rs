@@ -4,7 +4,7 @@ use crate::base::error::Error;
 use crate::config::{Settings, differing};
 use crate::store::metrics::{Moment, moments_of};
 use crate::store::run::RunFile;
-use crate::task::grouping::groups_text;
+use crate::task::class_names::ClassNames;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -18,6 +18,8 @@ pub(crate) struct Progress {
     pub(crate) moments: Vec<Moment>,
     /// All that its results depend on but the seed.
     pub(crate) settings: Settings,
+    /// The names of its classes, by which settings call them.
+    pub(crate) names: ClassNames,
 }
 
 /// Runs that differ in nothing but the seed, and so belong together.
@@ -48,7 +50,8 @@ pub(crate) fn group_by_settings(runs: &[Progress]) -> (Vec<String>, Vec<Settings
         .flat_map(from_first)
         .map(|(key, ..)| key)
         .collect();
-    let value = |run: &Progress, key: &String| run.settings.get(key).map(spoken);
+    let value =
+        |run: &Progress, key: &String| run.settings.get(key).map(|value| spoken(value, &run.names));
     let group = |runs: &Vec<&'_ Progress>| -> (String, Vec<Option<String>>) {
         let values: Vec<Option<String>> = keys.iter().map(|key| value(runs[0], key)).collect();
         let word = |(key, value): (&String, &Option<String>)| match (key.as_str(), value) {
@@ -79,8 +82,8 @@ pub(crate) fn group_by_settings(runs: &[Progress]) -> (Vec<String>, Vec<Settings
     (keys, described.into_iter().zip(groups).map(group).collect())
 }
 
-/// A value of a config for people: groups of classes as 0|1.
-fn spoken(value: &toml::Value) -> String {
+/// A value of a config for people: groups of classes as 0|1 or cat|dog.
+fn spoken(value: &toml::Value, names: &ClassNames) -> String {
     let classes = |list: &toml::Value| -> Option<Vec<u8>> {
         list.as_array()?
             .iter()
@@ -91,7 +94,7 @@ fn spoken(value: &toml::Value) -> String {
         let [a, b] = value.as_array()?.as_slice() else {
             return None;
         };
-        Some(groups_text([&classes(a)?, &classes(b)?], "|"))
+        Some(names.groups([&classes(a)?, &classes(b)?]))
     };
     groups().unwrap_or_else(|| {
         value
@@ -113,6 +116,7 @@ impl Progress {
             unit,
             moments,
             settings,
+            names: run.config.class_names(),
         })
     }
 }
@@ -129,6 +133,7 @@ mod tests {
             unit: None,
             moments: Vec::new(),
             settings: set(config),
+            names: ClassNames::default(),
         }
     }
 
@@ -149,5 +154,11 @@ mod tests {
         assert_eq!(groups[1].values, [Some("2".to_string()), None]);
         let (keys, groups) = group_by_settings(&runs[..1]);
         assert_eq!((keys.len(), groups[0].label.as_str()), (0, "toy"));
+        let names = ClassNames::of(&["cat", "dog"].map(String::from));
+        let named = runs.map(|run| Progress {
+            names: names.clone(),
+            ..run
+        });
+        assert_eq!(group_by_settings(&named).1[0].label, "parents=1, cat|dog");
     }
 }

@@ -68,3 +68,24 @@ impl ClassNames {
             })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_class_without_a_name_is_called_by_its_number() {
+        let names = ClassNames::of(&["cat", "", "guinea pig"].map(String::from));
+        assert_eq!(names.list(&[0, 1, 2, 9]), "cat, 1, guinea pig, 9");
+        assert_eq!(names.side(&[1, 9]), "1 9");
+        assert_eq!(names.side(&[2, 9]), "guinea pig, 9");
+        assert_eq!(
+            [names.class("guinea pig"), names.class("1")],
+            [Ok(2), Ok(1)]
+        );
+        assert_eq!(
+            names.class("cow").unwrap_err(),
+            "cow: expected one of the classes cat, guinea pig"
+        );
+    }
+}

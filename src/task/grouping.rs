@@ -7,7 +7,7 @@
 //! against 26, and `1|26` is 1 against 2 and 6. So a name means one task, whatever the data, and a
 //! task has one name.
 
-use crate::task::class_names::ClassNames;
+use crate::data::class_names::ClassNames;
 use crate::task::fitness::{Fitness, Group};
 use std::fmt;
 use std::str::FromStr;

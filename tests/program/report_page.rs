@@ -6,6 +6,7 @@
 use crate::common::browser::{Browser, found, keep_picture};
 use crate::common::program::{Sandbox, TINY, pairs};
 use morphcog::store::team::TeamFile;
+use serde_json::json;
 
 #[test]
 fn a_click_on_a_cell_plays_its_robot() {
@@ -249,15 +250,43 @@ fn with_26_classes_nothing_on_the_page_covers_anything_else() {
     sandbox
         .run(&format!("report -q {runs} --rollouts 1"))
         .ended(0, &[]);
-    let address = format!("file://{}", sandbox.path("runs/report.html").display());
+    // The same with names of three to fifteen letters: only the team's file has these, and its pages.
+    let names: Vec<String> = std::iter::once(String::new())
+        .chain((0..26_u8).map(|k| {
+            let letter = char::from(b'a' + k).to_string();
+            letter.repeat(3 + usize::from(k) % 13)
+        }))
+        .collect();
+    sandbox.write(
+        "letters/dataset.json",
+        json!({ "format": "morphcog-dataset", "format_version": 1, "class_names": names })
+            .to_string(),
+    );
+    sandbox
+        .run(&format!("team {runs} --images 104"))
+        .ended(0, &["(4 known"]);
+    sandbox
+        .run(&format!("report -q {runs} --rollouts 1 -o runs/named.html"))
+        .ended(0, &[]);
     let mut browser = Browser::start(&program, &sandbox);
-    for (width, height, dark) in [(1280, 900, false), (390, 844, true)] {
+    for (page, width, height, dark) in [
+        ("report", 1280, 900, false),
+        ("report", 390, 844, true),
+        ("named", 1280, 900, false),
+        ("named", 390, 844, true),
+    ] {
         let mut tab = browser.tab(width, height, dark);
-        tab.open(&address);
+        let path = sandbox.path(&format!("runs/{page}.html"));
+        tab.open(&format!("file://{}", path.display()));
         tab.wait(
             "document.querySelector('.stages figcaption') && document.querySelector('.tally li')",
         );
-        keep_picture(&format!("report-26-{width}.png"), &tab.screenshot());
+        let first = if page == "named" { "aaa" } else { "1" };
+        assert_eq!(
+            tab.eval("document.querySelector('.tally b').textContent"),
+            first
+        );
+        keep_picture(&format!("{page}-26-{width}.png"), &tab.screenshot());
         // Words of a figure, what stands beside each other, and what stands in a button.
         let covered = "(() => {
            const box = (e) => e.getBoundingClientRect(), found = [];
@@ -277,7 +306,7 @@ fn with_26_classes_nothing_on_the_page_covers_anything_else() {
            }));
            return found;
          })()";
-        assert_eq!(tab.eval(covered), serde_json::json!([]), "{width} pixels");
+        assert_eq!(tab.eval(covered), json!([]), "{page}, {width} pixels");
         let wide = tab
             .eval("document.documentElement.scrollWidth")
             .as_u64()

@@ -391,8 +391,8 @@ fn what_is_missing_or_does_not_go_together_is_said_with_exit_code_3() {
     let all = sandbox.run("team --archive pairs/0v1 pairs/0v4");
     all.ended(3, &["2, 3, 5, 6, 7, 8, 9", "--classes"]);
     sandbox
-        .run("team --archive pairs/0v1 pairs/0v4 --classes 0,1")
-        .ended(3, &["0|4"]);
+        .run("team --archive pairs/0v4 pairs/1v4 --classes 0,1")
+        .ended(3, &["left out: 2 robots that know other classes", "0, 1"]);
     sandbox.run("team").ended(3, &["data fetch mnist"]);
     sandbox.run("team --archive nowhere").ended(3, &["nowhere"]);
     sandbox
@@ -426,6 +426,21 @@ fn what_is_missing_or_does_not_go_together_is_said_with_exit_code_3() {
         .run("team --archive pairs/0v4 other --classes 0,1,4")
         .ended(3, &["other/run.json"]);
     assert!(!sandbox.path("pairs/team.json").exists());
+}
+
+#[test]
+fn robots_that_know_other_classes_are_left_out_of_a_team() {
+    let sandbox = pairs();
+    let said = sandbox
+        .run("team --archive pairs/0v1 pairs/0v4 pairs/1v4 --classes 1,4 --images 4 -o some.json")
+        .ended(0, &[]);
+    assert!(said.err.contains("left out: 2 robots"), "{}", said.err);
+    let team = read(&sandbox, "some.json");
+    assert_eq!((team.classes.as_slice(), team.size), (&[1, 4][..], 1));
+    sandbox
+        .run("team -q --archive pairs/1v4 --classes 1,4 --images 4 -o alone.json")
+        .ended(0, &[]);
+    assert_eq!(sandbox.read("some.json"), sandbox.read("alone.json"));
 }
 
 #[test]

@@ -207,13 +207,17 @@ pub(crate) fn evaluation(
         return console.warning("no robot was evaluated");
     }
     if console.mode() == Mode::Json {
-        let done = serde_json::json!({
+        let mut done = serde_json::json!({
             "file": out.map(|out| out.display().to_string()), "stopped": report.stopped,
             "images": report.images.len(), "split": report.split,
             "dataset": report.dataset, "trained_on": report.trained_on,
             "means": report.means, "baselines": report.baselines,
             "robots": report.robots.iter().map(RobotReport::without_displacements).collect::<Vec<_>>(),
         });
+        let class_names = report.names();
+        if !class_names.all().is_empty() {
+            done["class_names"] = serde_json::json!(class_names.all());
+        }
         return console.event("evaluated", &done);
     }
     let class_names = report.names();

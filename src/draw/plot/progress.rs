@@ -279,6 +279,7 @@ mod tests {
             unit: None,
             moments: best.iter().enumerate().map(moment).collect(),
             settings: Default::default(),
+            names: Default::default(),
         }
     }
 

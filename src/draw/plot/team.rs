@@ -48,13 +48,9 @@ pub fn confusion(file: &TeamFile) -> Option<Figure> {
     let names = widest(&mut file.classes.iter().map(name));
     let numbers = widest(&mut votes.confusion.iter().flatten().map(usize::to_string));
     let left = MARGIN + (3.0 * TEXT).max(TEXT + names + 8.0);
-    // Names of columns that are wider than these stand upright.
+    // Names that are wider than their columns stand upright.
     let is_named = !class_names.all().is_empty();
-    let needed = if is_named {
-        numbers
-    } else {
-        names.max(numbers)
-    };
+    let needed = numbers.max(if is_named { TEXT } else { names });
     // With many classes the figure is as wide as names and numbers need, up to a page.
     let within = |width: f64| (width - MARGIN - left) / count as f64;
     let side = (needed + 3.0).min(within(PAGE)).max(within(COLUMN));
@@ -289,7 +285,9 @@ impl Captions {
 
     fn write(&self, canvas: &mut Canvas, [middle, y]: [f64; 2], most: f64, member: &Member) {
         let below = CAPTION_LINE * (self.lines - 1) as f64;
-        for (line, text) in self.ways(member, most + GAP).iter().enumerate() {
+        // A line with a side of its own leaves the gap free.
+        let room = if self.lines == 1 { most + GAP } else { most };
+        for (line, text) in self.ways(member, room).iter().enumerate() {
             let y = y + 7.5 + CAPTION_LINE * line as f64;
             canvas.text([middle, y], text, TextStyle::middle());
         }
@@ -337,9 +335,8 @@ mod tests {
     use super::*;
     use crate::store::team::Accuracy;
 
-    #[test]
-    fn a_caption_has_a_bar_between_the_classes_of_the_two_ways() {
-        let mut member = Member {
+    fn member() -> Member {
+        Member {
             id: "a".into(),
             run: "toy".into(),
             run_sha256: String::new(),
@@ -355,7 +352,12 @@ mod tests {
             not_moved: 0.0,
             displacements: Vec::new(),
             shown: Vec::new(),
-        };
+        }
+    }
+
+    #[test]
+    fn a_caption_has_a_bar_between_the_classes_of_the_two_ways() {
+        let mut member = member();
         let captions = Captions {
             names: ClassNames::default(),
             lines: 1,
@@ -391,5 +393,24 @@ mod tests {
             text.starts_with("← 1 2 3") && text.contains("… | 14 1") && text.ends_with("… →"),
             "{text}"
         );
+    }
+
+    #[test]
+    fn named_classes_have_a_line_for_each_side_of_a_caption() {
+        let names = ["cat", "guinea pig", "dog"].map(String::from);
+        let captions = Captions {
+            names: ClassNames::of(&names),
+            lines: 2,
+        };
+        let mut member = member();
+        member.groups = [vec![0, 1], vec![2]];
+        member.first_group_walks = "left".into();
+        assert_eq!(
+            captions.ways(&member, 200.0),
+            ["← cat, guinea pig", "dog →"]
+        );
+        for line in captions.ways(&member, 40.0) {
+            assert!(fonts::width(&line, TEXT, false) <= 40.0, "{line}");
+        }
     }
 }
