@@ -18,7 +18,7 @@ use crate::commands::train::{self, TrainOptions};
 use crate::config::Config;
 use crate::config::audit::Criteria;
 use crate::config::train::TrainConfig;
-use crate::data::dataset::{Dataset, Split};
+use crate::data::dataset::Split;
 use crate::images::whereabouts::Whereabouts;
 use crate::response::probing::{Probing, response as response_of};
 use crate::robots;
@@ -29,7 +29,6 @@ use crate::store::names::{AUDIT_JSON, RESPONSE_JSON, RUN_JSON, TRAINING_JSON, VA
 use crate::store::run::different;
 use crate::store::stored_run::StoredRun;
 use crate::store::validation::ranking;
-use crate::task::class_names::ClassNames;
 use crate::task::grouping::Groups;
 use crate::training;
 use crate::training::gaits::{Candidate, candidates, measured};
@@ -126,7 +125,7 @@ impl PairsOptions {
         let config = training::changed(&first.run.config, &set)?;
         let dataset = whereabouts.load(&config.data, &[Split::Train])?;
         let names = config.with_names_of(&dataset).class_names();
-        let classes = self.classes(&dataset, &names)?;
+        let classes = dataset.chosen(self.classes.as_deref())?;
         let mut tasks = Vec::new();
         for (place, &a) in classes.iter().enumerate() {
             for &b in &classes[place + 1..] {
@@ -155,34 +154,6 @@ impl PairsOptions {
             }
         }
         Ok(tasks)
-    }
-
-    fn classes(&self, dataset: &Dataset, names: &ClassNames) -> Result<Vec<u8>, Error> {
-        let there = dataset.classes(Split::Train);
-        let asked = match &self.classes {
-            None => there.clone(),
-            Some(texts) => {
-                let read = texts.iter().map(|text| names.class(text));
-                let read = read.collect::<Result<Vec<u8>, String>>();
-                read.map_err(|text| Error::usage(text).about("classes"))?
-            }
-        };
-        let mut classes = asked;
-        classes.sort_unstable();
-        classes.dedup();
-        if let Some(class) = classes.iter().find(|class| !there.contains(class)) {
-            let text = format!(
-                "{} has no class {}: expected classes of {}",
-                dataset.name(),
-                names.name(*class),
-                names.list(&there)
-            );
-            return Err(Error::usage(text).about("classes"));
-        }
-        match classes.len() < 2 {
-            true => Err(Error::usage("expected two or more".to_string()).about("classes")),
-            false => Ok(classes),
-        }
     }
 }
 

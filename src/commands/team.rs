@@ -309,24 +309,7 @@ fn chosen<'a>(options: &TeamOptions, sources: &'a [StoredRun]) -> Result<Vec<Cho
 }
 
 fn classes(options: &TeamOptions, dataset: &Dataset) -> Result<Vec<u8>, Error> {
-    let (all, names) = (dataset.classes(Split::Train), dataset.class_names());
-    let mut classes = match &options.classes {
-        None => all.clone(),
-        Some(texts) => {
-            let read = texts.iter().map(|text| names.class(text));
-            let read = read.collect::<Result<Vec<u8>, String>>();
-            read.map_err(|text| Error::usage(text).about("classes"))?
-        }
-    };
-    classes.sort_unstable();
-    classes.dedup();
-    if let Some(class) = classes.iter().find(|class| !all.contains(class)) {
-        let text = format!("{} has no class {}", dataset.name(), names.name(*class));
-        return Err(Error::usage(text).about("classes"));
-    }
-    if classes.len() < 2 {
-        return Err(Error::usage("expected two or more".to_string()).about("classes"));
-    }
+    let classes = dataset.chosen(options.classes.as_deref())?;
     if !options.images.has_each(classes.len()) {
         let (asked, least) = (options.images, classes.len());
         return Err(Error::argument(

@@ -283,6 +283,37 @@ impl Dataset {
             .map_or_else(Vec::new, |loaded| loaded.by_class.keys().copied().collect())
     }
 
+    /// Returns the training classes that a user names, or all of them, ascending.
+    ///
+    /// # Errors
+    /// Returns an error about `classes` if one is not there, or if there are fewer than two.
+    pub(crate) fn chosen(&self, texts: Option<&[String]>) -> Result<Vec<u8>, Error> {
+        let (all, names) = (self.classes(Split::Train), &self.class_names);
+        let mut classes = match texts {
+            None => all.clone(),
+            Some(texts) => {
+                let read = texts.iter().map(|text| names.class(text));
+                let read = read.collect::<Result<Vec<u8>, String>>();
+                read.map_err(|text| Error::usage(text).about("classes"))?
+            }
+        };
+        classes.sort_unstable();
+        classes.dedup();
+        if let Some(class) = classes.iter().find(|class| !all.contains(class)) {
+            let text = format!(
+                "{} has no class {}: expected some of {}",
+                self.name,
+                names.name(*class),
+                names.list(&all)
+            );
+            return Err(Error::usage(text).about("classes"));
+        }
+        match classes.len() < 2 {
+            true => Err(Error::usage("expected two or more".to_string()).about("classes")),
+            false => Ok(classes),
+        }
+    }
+
     /// Returns a split's SHA-256 (see [`SplitInfo::fingerprint`]); `None` if it was not loaded.
     pub(crate) fn fingerprint(&self, split: Split) -> Option<String> {
         self.splits.get(&split).map(|loaded| match &loaded.images {

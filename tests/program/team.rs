@@ -329,7 +329,7 @@ fn a_test_that_was_stopped_goes_on_and_ends_with_the_same_bytes_on_any_threads()
         }
         member["shown"] = shown.into();
     }
-    sandbox.write("parts/team.json", &part.to_string());
+    sandbox.write("parts/team.json", part.to_string());
     let said = sandbox
         .run(&format!("{TEAM} --images 6 -o parts/team.json --threads 2"))
         .ended(0, &[]);
