@@ -58,9 +58,14 @@ it. The robot is validated on images that it was not trained on, and audited. Ct
 --resume goes on, also after its end with more challengers (--set train.challengers=240).
 
 --pairs trains each pair of classes with the gait whose response predicts the highest accuracy, and, \
-if that body is not physical, with the next best, too. Its settings are those of the team that ships \
-(morphcog help train lists them); --set changes them. The same command goes on after Ctrl-C, here or \
-elsewhere. Exit code 0: all pairs are done; 1: some failed; 75: stopped.";
+if that body is not physical, with the next best, too. The same command goes on after Ctrl-C, here or \
+elsewhere. Exit code 0: all pairs are done; 1: some failed; 75: stopped. Its settings, which --set \
+changes, are those of the team that ships:
+  stimulus.margin=5 stimulus.reduction=area
+  stimulus.encoding=threshold stimulus.level=0.25
+  train.windows=2000 train.random_images=600 train.rounds=4
+  train.images=120 train.final_images=400
+  train.challengers=8 validation.images=400";
 
 /// Help for `--archive`, whose default depends on `--pairs`.
 const ARCHIVE: &str = "The run.json of the gaits, or its folder (default: the newest under runs/; with --pairs \
@@ -441,4 +446,16 @@ pub(super) fn trained(
         &format!("morphcog eval --archive {}", in_shell(&archive)),
     );
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn help_lists_the_settings_of_pairs() {
+        for setting in pairs::SETTINGS {
+            assert!(EXAMPLES.contains(setting), "{setting}");
+        }
+    }
 }
