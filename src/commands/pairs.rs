@@ -213,7 +213,7 @@ pub(crate) fn measure(of: &Gaits, session: &Session) -> Result<(), Error> {
             physical_only: false,
             task: None,
             set: Vec::new(),
-            images: rollouts,
+            images: rollouts.max(response::BATCH),
             error: 0.0,
             seed: None,
         };

@@ -374,6 +374,10 @@ fn every_event_of_json_is_documented_with_its_fields() {
                  train.windows=4 --set stimulus.reduction=area --set train.rounds=1 --set train.images=4 --set \
                  train.final_images=4 --set train.challengers=1 --set protocol.control_steps=50 --set \
                  validation.images=40 --set validation.best=0";
+    let [one_pair, pairs] = ["--pair 1", ""].map(|what| {
+        let pairs = train.replace("--task 0|1", "--pairs --classes 0,1");
+        format!("{} {what}", pairs.replace("--out taught", "--out pairs"))
+    });
     let mut seen = BTreeSet::new();
     sandbox.write(
         "own.csv",
@@ -382,6 +386,8 @@ fn every_event_of_json_is_documented_with_its_fields() {
     for args in [
         "evolve -c tiny.toml -o new",
         train,
+        &one_pair,
+        &pairs,
         "train -a run --robots all --task 0|1 --out own --set train.rounds=0 --set train.random_images=20 \
          --set train.final_images=4 --set train.challengers=1 --set validation.images=40",
         "response -a taught --images 60",
