@@ -229,10 +229,13 @@ pub(crate) fn measure(of: &Gaits, session: &Session) -> Result<(), Error> {
 }
 
 impl Gaits {
-    /// Returns the config of a training with the gaits of one of the runs.
+    /// Returns the config of a training with the gaits of one of the runs, whose measured walks hold
+    /// for it.
     fn config(&self, source: &StoredRun) -> Result<Config, Error> {
         let groups = self.groups.classes();
-        training::config_of(&source.run.config, groups, self.seed, &self.set)
+        let config = training::config_of(&source.run.config, groups, self.seed, &self.set)?;
+        response::same_walks(&source.run.config, &config)?;
+        Ok(config)
     }
 }
 
@@ -336,10 +339,10 @@ fn predicted(
     probing: &Probing,
     session: &Session,
 ) -> Result<Option<(f64, [f64; 2])>, Error> {
-    let count = predictor.config.train.random_images.min(known.len());
+    let count = known.len();
     let physics = &predictor.config.physics;
     let shown = probing.shown(&candidate.gait, physics, 0..count, |_, _, _| {
-        Ok::<_, Error>(known[..count].to_vec())
+        Ok::<_, Error>(known.to_vec())
     })?;
     let Some(response) = response_of(&shown, count) else {
         return Ok(None);

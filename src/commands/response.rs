@@ -360,7 +360,7 @@ fn task(
 }
 
 /// Checks that a training would simulate as the run did: the measurement holds for no other.
-fn same_walks(of_run: &Config, training: &Config) -> Result<(), Error> {
+pub(crate) fn same_walks(of_run: &Config, training: &Config) -> Result<(), Error> {
     let steps = |config: &Config| Protocol {
         rollout: RolloutMode::Fresh,
         ..config.protocol.clone()

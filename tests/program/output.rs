@@ -376,7 +376,12 @@ fn every_event_of_json_is_documented_with_its_fields() {
                  validation.images=40 --set validation.best=0";
     let [one_pair, pairs] = ["--pair 1", ""].map(|what| {
         let pairs = train.replace("--task 0|1", "--pairs --classes 0,1");
-        format!("{} {what}", pairs.replace("--out taught", "--out pairs"))
+        format!(
+            "{} {what}",
+            pairs
+                .replace("--out taught", "--out pairs")
+                .replace("--set protocol.control_steps=50", "")
+        )
     });
     let mut seen = BTreeSet::new();
     sandbox.write(

@@ -129,6 +129,11 @@ fn what_cannot_be_paired_is_refused_before_anything_is_measured() {
             vec!["--pair 99", "1 to 1"],
         ),
         ("--pairs --set train.rounds=x", 2, vec!["train.rounds"]),
+        (
+            "--pairs --set protocol.control_steps=50 --classes 1,3",
+            2,
+            vec!["protocol", "what robots see"],
+        ),
         ("--classes 1,3 --task 1|3", 2, vec!["--classes", "--pairs"]),
         ("", 2, vec!["--task"]),
     ] {
