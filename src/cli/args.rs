@@ -430,7 +430,7 @@ pub(super) enum DataCommand {
     /// Make a dataset of pictures, arrays or tables of your own.
     ///
     /// Images become grey, bright on a dark ground, and of one size. Training and test images are the
-    /// source's own or drawn by the seed. What was done to them is said.
+    /// source's own or drawn by the seed. The command says what it did to them.
     #[command(after_help = "\
 Examples:
   morphcog data import photos/ --name shapes

@@ -28,7 +28,7 @@ pub(super) struct ImportArgs {
     /// Share of each class for tests, if the source has no test images of its own.
     #[arg(long, value_name = "SHARE", default_value_t = 0.2, value_parser = decimal())]
     test: f64,
-    /// Seed of the draw of these.
+    /// Seed for drawing the test images.
     #[arg(long, default_value_t = 1, value_parser = seed())]
     seed: u64,
     /// Side of the images made of pictures, in pixels.

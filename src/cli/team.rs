@@ -53,9 +53,10 @@ pub(super) struct TeamArgs {
     /// that know others are left out.
     #[arg(long, value_delimiter = ',')]
     classes: Vec<String>,
-    /// Number of images in all, equally many per class; or "all": every image of the classes.
-    #[arg(short = 'n', long, default_value_t = HowMany::Evenly(1000))]
-    images: HowMany,
+    /// Number of images in all, equally many per class; or "all": every image of the classes
+    /// (default: 1000, or all if there are fewer).
+    #[arg(short = 'n', long)]
+    images: Option<HowMany>,
     /// Which images: test, or validation (of the training split, neither trained on nor chosen
     /// from).
     #[arg(long, default_value_t = HeldOut::Test, value_name = "SPLIT", value_parser = held_out())]

@@ -44,7 +44,7 @@ Examples:
   # look for the part of the images that helps most
   morphcog train --task \"4|9\" --set train.windows=2000 \\
     --set stimulus.reduction=area
-  # a body for each pair of classes, which answer together
+  # a body for each pair of classes; they answer as a team
   morphcog train --pairs --dataset shapes
   morphcog train --pairs --classes 0,1,2,3 --status
   morphcog train --pairs --list | parallel
@@ -58,18 +58,19 @@ it. The robot is validated on images that it was not trained on, and audited. Ct
 --resume goes on, also after its end with more challengers (--set train.challengers=240).
 
 --pairs trains each pair of classes with the gait whose response predicts the highest accuracy, and, \
-if that body is not physical, with the next best, too. The same command goes on after Ctrl-C, here or \
-elsewhere. Exit code 0: all pairs are done; 1: some failed; 75: stopped. Its settings, which --set \
-changes, are those of the team that ships:
-  stimulus.margin=5 stimulus.reduction=area
-  stimulus.encoding=threshold stimulus.level=0.25
+if the result is not physical, with the next best gait, too. The same command goes on after Ctrl-C, here or \
+elsewhere. Exit code 0: all pairs are done; 1: some failed; 75: stopped. The settings are those of the \
+team that ships; --set changes them:
+  stimulus.reduction=area stimulus.encoding=threshold
+  stimulus.level=0.25 stimulus.margin=5 (0 for images of
+  another size than the gaits')
   train.windows=2000 train.random_images=600 train.rounds=4
   train.images=120 train.final_images=400
   train.challengers=8 validation.images=400";
 
 /// Help for `--archive`, whose default depends on `--pairs`.
 const ARCHIVE: &str = "The run.json of the gaits, or its folder (default: the newest under runs/; with --pairs \
-gallery:gaits); of several, the gait is trained whose response predicts the highest accuracy";
+gallery:gaits); of several, the gait with the highest predicted accuracy is trained";
 
 #[derive(Debug, Args)]
 #[command(mut_arg("archive", |archive| archive.help(ARCHIVE)))]
@@ -86,7 +87,7 @@ pub(super) struct TrainArgs {
     /// Classes of the pairs, by name or number, such as 0,1,2 (default: all of the dataset).
     #[arg(long, value_delimiter = ',', requires = "pairs")]
     classes: Vec<String>,
-    #[arg(short, long, visible_aliases = ["robot", "select"], help = format!("{ROBOTS} [default: top:4, of each archive top:5 with --pairs]"))]
+    #[arg(short, long, visible_aliases = ["robot", "select"], help = format!("{ROBOTS} [default: top:4; with --pairs or several archives top:5 of each]"))]
     robots: Vec<Selection>,
     /// Random seed (default: that of the archive's run).
     #[arg(long, value_parser = seed())]
@@ -321,7 +322,7 @@ fn warn_of_unmeasured(gaits: &Gaits, console: &Console) -> Result<(), Error> {
             None => in_shell(&unmeasured.archive),
         };
         console.warning(&format!(
-            "{} of these gaits are not measured yet; before the others start, run: morphcog response \
+            "gaits not measured yet: {}; before the pairs start, run: morphcog response \
              --archive {archive} --robots {} --images {} --error 0",
             unmeasured.robots.len(),
             quoted(unmeasured.robots.join(",")),

@@ -1,7 +1,7 @@
-//! `morphcog train --pairs`: a robot for each pair of classes, which answer together as a team.
+//! `morphcog train --pairs`: a robot for each pair of classes; these robots answer as a team.
 //!
 //! Each pair is a task of its own. It is trained with the gait whose response predicts the highest
-//! accuracy; if that robot is not physical, with the next best gait, too.
+//! accuracy; if the trained robot is not physical, with the next best gait, too.
 
 use crate::base::error::Error;
 use crate::base::files::{read_bytes, write_atomically};
@@ -19,7 +19,7 @@ use crate::config::Config;
 use crate::config::audit::Criteria;
 use crate::config::train::TrainConfig;
 use crate::data::dataset::Split;
-use crate::images::whereabouts::Whereabouts;
+use crate::images::whereabouts::{Whereabouts, size_of};
 use crate::response::probing::{Probing, response as response_of};
 use crate::robots;
 use crate::robots::selection::Selection;
@@ -38,8 +38,7 @@ use std::path::{Path, PathBuf};
 
 /// Keys that differ from those of the gaits' runs, unless the user sets them: those with which the
 /// team that ships was trained.
-pub(crate) const SETTINGS: [&str; 11] = [
-    "stimulus.margin=5",
+pub(crate) const SETTINGS: [&str; 10] = [
     "stimulus.reduction=area",
     "stimulus.encoding=threshold",
     "stimulus.level=0.25",
@@ -51,6 +50,9 @@ pub(crate) const SETTINGS: [&str; 11] = [
     "train.challengers=8",
     "validation.images=400",
 ];
+
+/// Margin of images of the size that the gaits' run has; of others, gaits see the whole.
+pub(crate) const MARGIN: usize = 5;
 
 /// Windows under which each gait's accuracy is predicted.
 const WINDOWS: usize = 100;
@@ -80,7 +82,7 @@ pub(crate) struct PairsOptions {
 
 impl PairsOptions {
     /// Returns all keys that a training changes, the user's last.
-    fn settings(&self) -> Vec<String> {
+    fn settings(&self, margin: usize) -> Vec<String> {
         let dataset = self
             .dataset
             .iter()
@@ -88,6 +90,7 @@ impl PairsOptions {
         SETTINGS
             .iter()
             .map(ToString::to_string)
+            .chain([format!("stimulus.margin={margin}")])
             .chain(dataset)
             .chain(self.set.iter().cloned())
             .collect()
@@ -99,7 +102,7 @@ impl PairsOptions {
     /// Returns an error if there is no such run, or a key is wrong.
     pub(crate) fn dataset_name(&self) -> Result<String, Error> {
         let first = self.sources()?.swap_remove(0);
-        let config = training::changed(&first.run.config, &self.settings())?;
+        let config = training::changed(&first.run.config, &self.settings(0))?;
         Ok(config.data.dataset)
     }
 
@@ -116,14 +119,16 @@ impl PairsOptions {
     /// Returns an error if a run, a key, a class or the dataset is unsuitable.
     pub(crate) fn tasks(&self, data: Option<&Path>) -> Result<Vec<Task>, Error> {
         let sources = self.sources()?;
-        let set = self.settings();
         let first = &sources[0];
         let whereabouts = self
             .archives
             .iter()
             .fold(Whereabouts::given(data), |all, archive| all.and_of(archive));
-        let config = training::changed(&first.run.config, &set)?;
+        let config = training::changed(&first.run.config, &self.settings(0))?;
         let dataset = whereabouts.load(&config.data, &[Split::Train])?;
+        let size = size_of(&first.run.dataset, &first.run.config.data.dataset, &dataset);
+        let is_as_before = size.is_some() && size == dataset.size(Split::Train);
+        let set = self.settings(if is_as_before { MARGIN } else { 0 });
         let names = config.with_names_of(&dataset).class_names();
         let classes = dataset.chosen(self.classes.as_deref())?;
         let mut tasks = Vec::new();
@@ -187,7 +192,7 @@ pub(crate) fn unmeasured(of: &Gaits, session: &Session) -> Result<Vec<Unmeasured
             all.push(Unmeasured {
                 archive: archive.clone(),
                 robots,
-                rollouts,
+                rollouts: rollouts.max(response::BATCH),
             });
         }
     }
@@ -213,7 +218,7 @@ pub(crate) fn measure(of: &Gaits, session: &Session) -> Result<(), Error> {
             physical_only: false,
             task: None,
             set: Vec::new(),
-            images: rollouts.max(response::BATCH),
+            images: rollouts,
             error: 0.0,
             seed: None,
         };
@@ -268,7 +273,7 @@ pub(crate) fn best_gait(of: &Gaits, session: &Session) -> Result<(PathBuf, Selec
     let ranked = session.pool()?.install(|| ranked(of, session))?;
     let best = ranked.into_iter().next().ok_or_else(unstable)?;
     session.observer.note(&format!(
-        "{} of {}: {} % are predicted, the most of all gaits",
+        "{} of {}: predicted accuracy {} %, the highest of all gaits",
         best.id,
         name(&best.archive),
         number::percent(best.accuracy)
@@ -461,7 +466,7 @@ pub(crate) struct PairOutcome {
     pub(crate) audit: String,
 }
 
-/// Returns the outcome of each trained of.
+/// Returns the outcome of each trained pair.
 ///
 /// # Errors
 /// Returns an error if a file is missing or broken.

@@ -12,7 +12,7 @@ use crate::baseline::nearest::nearest;
 use crate::commands::eval::images::chosen_by;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
-use crate::images::held_out::{images_besides, test_images};
+use crate::images::held_out::{USUAL, images_besides, test_images, usual};
 use crate::images::whereabouts::{
     Whereabouts, load_dataset_of, part_of_others, stimuli_of, stimulus_of,
 };
@@ -59,7 +59,8 @@ pub(crate) struct TeamOptions {
     pub(crate) robots: Selection,
     /// Classes to tell apart, by name or number; `None`: all of the dataset.
     pub(crate) classes: Option<Vec<String>>,
-    pub(crate) images: HowMany,
+    /// Number of images; `None`: [`usual`](crate::images::held_out::usual).
+    pub(crate) images: Option<HowMany>,
     pub(crate) split: HeldOut,
     /// Seed for drawing images, and robots with `random:N`.
     pub(crate) seed: u64,
@@ -113,9 +114,14 @@ pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutco
     let splits = splits.collect::<Result<Vec<grouping::ClassSplit>, Error>>()?;
     let (robots, splits) = within(&classes, robots, splits, session);
     covered(&splits, &classes, dataset.class_names())?;
+    let how_many = match (options.images, options.split) {
+        (Some(asked), _) => asked,
+        (None, HeldOut::Test) => usual(&classes, &dataset),
+        (None, HeldOut::Validation) => HowMany::Evenly(USUAL),
+    };
     let images = match options.split {
-        HeldOut::Test => test_images(&classes, &dataset, options.images, options.seed)?,
-        HeldOut::Validation => validation_images(options, &sources, &classes, &dataset)?,
+        HeldOut::Test => test_images(&classes, &dataset, how_many, options.seed)?,
+        HeldOut::Validation => validation_images(how_many, &sources, &classes, &dataset)?,
     };
     let mut file = TeamFile {
         format: FORMAT.to_string(),
@@ -310,8 +316,11 @@ fn chosen<'a>(options: &TeamOptions, sources: &'a [StoredRun]) -> Result<Vec<Cho
 
 fn classes(options: &TeamOptions, dataset: &Dataset) -> Result<Vec<u8>, Error> {
     let classes = dataset.chosen(options.classes.as_deref())?;
-    if !options.images.has_each(classes.len()) {
-        let (asked, least) = (options.images, classes.len());
+    if let Some(asked) = options
+        .images
+        .filter(|asked| !asked.has_each(classes.len()))
+    {
+        let least = classes.len();
         return Err(Error::argument(
             "images",
             asked,
@@ -390,21 +399,14 @@ fn covered(
 
 /// Draws images of the training split that no run was trained on and no robot was chosen by.
 fn validation_images(
-    options: &TeamOptions,
+    how_many: HowMany,
     sources: &[StoredRun],
     classes: &[u8],
     dataset: &Dataset,
 ) -> Result<Vec<ImageRef>, Error> {
     let besides = chosen_by(sources, dataset, shown_for_validation)?;
     let runs: Vec<_> = sources.iter().map(|source| &source.run).collect();
-    images_besides(
-        &besides,
-        &runs,
-        classes,
-        dataset,
-        Some("images"),
-        options.images,
-    )
+    images_besides(&besides, &runs, classes, dataset, Some("images"), how_many)
 }
 
 /// Returns true if two tests use the same images in the same way, so that members carry over.

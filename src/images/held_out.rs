@@ -187,6 +187,19 @@ pub(crate) fn images_besides(
     Ok(turns.take(count).collect())
 }
 
+/// Number of images of a test if nobody says another.
+pub(crate) const USUAL: usize = 1000;
+
+/// Returns how many test images are shown if nobody says: 1000, or all if there are fewer.
+pub(crate) fn usual(classes: &[u8], dataset: &Dataset) -> HowMany {
+    let of_class = |class: &u8| dataset.indices_of(Split::Test, *class).len();
+    let fewest = classes.iter().map(of_class).min().unwrap_or(0);
+    match fewest >= USUAL.div_ceil(classes.len().max(1)) {
+        true => HowMany::Evenly(USUAL),
+        false => HowMany::All,
+    }
+}
+
 /// Returns test images by class: all, or an even share drawn of each; first classes get the rest.
 pub(crate) fn test_images(
     classes: &[u8],

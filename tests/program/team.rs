@@ -450,7 +450,7 @@ fn a_second_test_on_other_images_keeps_the_first() {
     let first = sandbox.read("pairs/team.json");
     sandbox
         .run(&format!("{TEAM} --images 6"))
-        .ended(0, &["(3 known", " 0.0 rollouts/s"]);
+        .ended(0, &["(18 of 18 walks known", " 0.0 rollouts/s"]);
     assert_eq!(sandbox.read("pairs/team.json"), first);
     sandbox
         .run(&format!("{TEAM} --images 6 --seed 2"))

@@ -4,6 +4,7 @@
 use crate::common::program::{Sandbox, said};
 use clap::Parser;
 use morphcog::cli::Cli;
+use serde_json::Value;
 use std::path::Path;
 
 /// The commands of a page: lines of `console` blocks that begin with a prompt, without `morphcog`
@@ -62,11 +63,22 @@ fn in_small(mut command: Vec<String>) -> Vec<String> {
         command.extend(["--every", "20"].map(str::to_string));
     }
     if command[0] == "train" {
-        let settings = [
+        let mut settings = vec![
             "train.images_per_class=20",
             "train.random_images=60",
             "train.final_images=10",
         ];
+        if command.iter().any(|word| word == "--pairs") {
+            settings.extend([
+                "train.windows=60",
+                "train.rounds=1",
+                "train.images=20",
+                "train.challengers=0",
+                "validation.best=0",
+            ]);
+            let gait = ["--archive", "gallery:gaits-6", "--robots", "best"];
+            command.extend(gait.map(str::to_string));
+        }
         command.extend(
             settings
                 .iter()
@@ -143,40 +155,65 @@ fn every_command_of_the_tutorial_works_in_small() {
     assert_eq!(sandbox.run_file("runs/quickstart-seed1").generations, 4);
 }
 
-#[test]
-fn every_command_of_the_page_on_own_images_works_in_small_with_images_of_one_s_own() {
-    let sandbox = Sandbox::new();
-    // Crosses, bars and so on: ten images of each of five classes, 14 × 14 pixels.
-    let (count, side) = (50_u32, 14_u32);
-    let image = |number: u32| {
-        (0..side * side).map(move |pixel| {
-            let (row, column) = (pixel / side, pixel % side);
-            let is_on = match number % 5 {
-                0 => row == column || row + column == side - 1,
-                1 => row % 4 == number / 5 % 4,
-                2 => column % 4 == number / 5 % 4,
-                3 => row < 7,
-                _ => column < 7,
-            };
-            if is_on { 200 } else { 0 }
+/// Writes a picture of a shape, dark on bright, of an odd size, somewhere in it.
+fn draw(sandbox: &Sandbox, name: &str, class: usize, number: usize) {
+    let noise = |salt: usize| {
+        let mixed = (number * 31 + class * 7 + salt * 101 + 1) as u32;
+        (mixed.wrapping_mul(2_654_435_761) >> 8) as usize
+    };
+    let [height, width] = [noise(1), noise(2)].map(|noise| 31 + noise % 40);
+    let radius = height.min(width) as f64 * (0.28 + (noise(3) % 12) as f64 / 100.0);
+    let at = |side: usize, noise: usize| {
+        radius + 1.0 + (side as f64 - 2.0 * radius - 2.0) * (noise % 100) as f64 / 100.0
+    };
+    let (row, column) = (at(height, noise(4)), at(width, noise(5)));
+    let is_ink = |y: usize, x: usize| {
+        let (dy, dx) = ((y as f64 - row) / radius, (x as f64 - column) / radius);
+        let (from, inside) = match class {
+            0 => ((dy * dy + dx * dx).sqrt(), 0.7),
+            1 => (dy.abs().max(dx.abs()) * 1.2, 0.7),
+            _ => (dy.max(1.7 * dx.abs() - dy), 0.5),
+        };
+        (inside..=1.0).contains(&from)
+    };
+    let pixels: Vec<u8> = (0..height * width)
+        .map(|place| {
+            if is_ink(place / width, place % width) {
+                20
+            } else {
+                240
+            }
         })
-    };
-    let header = |kind: u8, sizes: &[u32]| {
-        let mut bytes = vec![0, 0, 8, kind];
-        sizes
-            .iter()
-            .for_each(|size| bytes.extend(size.to_be_bytes()));
-        bytes
-    };
-    for split in ["train", "t10k"] {
-        let mut images = header(3, &[count, side, side]);
-        images.extend((0..count).flat_map(image));
-        let mut labels = header(1, &[count]);
-        labels.extend((0..count).map(|number| (number % 5) as u8));
-        sandbox.write(&format!("shapes/{split}-images-idx3-ubyte"), images);
-        sandbox.write(&format!("shapes/{split}-labels-idx1-ubyte"), labels);
+        .collect();
+    let path = sandbox.path(&format!("photos/{name}/{number}.png"));
+    std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+    let file = std::fs::File::create(path).unwrap();
+    let mut encoder = png::Encoder::new(file, width as u32, height as u32);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder
+        .write_header()
+        .unwrap()
+        .write_image_data(&pixels)
+        .unwrap();
+}
+
+#[test]
+fn every_command_of_the_page_on_own_images_works_in_small_with_pictures_of_one_s_own() {
+    let sandbox = Sandbox::new();
+    for (class, name) in ["circle", "square", "triangle"].iter().enumerate() {
+        (0..30).for_each(|number| draw(&sandbox, name, class, number));
     }
     all_work("own-images.md", &sandbox);
-    let run = sandbox.run_file("runs/shapes");
-    assert_eq!(run.config.task.groups, Some([vec![0], vec![3, 4]]));
+    let team: Value = serde_json::from_str(&sandbox.read("runs/shapes-team/team.json")).unwrap();
+    let accuracy = &team["answers"]["votes"]["accuracy"]["accuracy"];
+    assert!(accuracy.as_f64().unwrap() >= 0.8, "{accuracy}");
+    assert_eq!(team["images"].as_array().unwrap().len(), 18);
+    let tasks = ["circle|square", "circle|triangle", "square|triangle"];
+    for (member, task) in team["members"].as_array().unwrap().iter().zip(tasks) {
+        assert_eq!(member["task"], task);
+    }
+    assert_eq!(
+        sandbox.run_file("runs/shapes").elites[0].task,
+        "circle|square,triangle"
+    );
 }

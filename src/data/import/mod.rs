@@ -317,7 +317,7 @@ pub(crate) fn stage(
     Ok(Staged { staging, imported })
 }
 
-/// Refuses to replace a folder that holds a source, or lies in one.
+/// Refuses to replace a folder that is a source, or holds one.
 fn check_apart(sources: &[PathBuf], folder: &Path) -> Result<(), Error> {
     let Ok(folder) = folder.canonicalize() else {
         return Ok(());
