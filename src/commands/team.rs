@@ -59,7 +59,7 @@ pub(crate) struct TeamOptions {
     pub(crate) robots: Selection,
     /// Classes to tell apart, by name or number; `None`: all of the dataset.
     pub(crate) classes: Option<Vec<String>>,
-    /// Number of images; `None`: [`usual`](crate::images::held_out::usual).
+    /// Number of images; `None`: [`usual`].
     pub(crate) images: Option<HowMany>,
     pub(crate) split: HeldOut,
     /// Seed for drawing images, and robots with `random:N`.
