@@ -435,7 +435,7 @@ pub(super) enum DataCommand {
 Examples:
   morphcog data import photos/ --name shapes
   morphcog data import mnist.npz --name mine
-  morphcog data import train.csv test.csv --name letters --to ~/data/letters")]
+  morphcog data import train.csv test.csv --name letters")]
     Import(ImportArgs),
     /// Show which files of a dataset are found, and where.
     #[command(
