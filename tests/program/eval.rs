@@ -51,7 +51,7 @@ fn whoever_simulates_a_run_of_another_version_says_so_once() {
         assert!(!said.err.contains("0.0.9"), "{said:?}");
     }
     let said = sandbox
-        .run("response -a gallery:gaits -n 60 -o gaits.json")
+        .run("response -a gallery:gaits-6 -n 60 -o gaits.json")
         .ended(0, &[]);
     assert!(!said.err.contains("made by morphcog"), "{said:?}");
 }

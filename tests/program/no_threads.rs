@@ -56,7 +56,7 @@ fn where_the_system_has_no_thread_left_every_command_says_so_and_none_panics() {
     for (args, needs_threads) in [
         ("evolve -c tiny.toml -o new", true),
         (
-            "train -a gallery:gaits -t 0|1 --set data.dataset=builtin -o trained",
+            "train -a gallery:gaits-6 -t 0|1 --set data.dataset=builtin -o trained",
             true,
         ),
         ("demo -o demo", true),

@@ -1,6 +1,7 @@
 //! `train --pairs`: a robot for each pair of classes, in tasks like those of a sweep.
 
 use crate::common::program::{Made, Sandbox, TINY, files, write_images};
+use morphcog::store::run::RunFile;
 use serde_json::Value;
 use std::sync::OnceLock;
 
@@ -142,4 +143,33 @@ fn what_cannot_be_paired_is_refused_before_anything_is_measured() {
             .ended(code, &said);
         assert!(!sandbox.path("none").exists());
     }
+}
+
+#[test]
+fn of_several_archives_the_gait_with_the_highest_prediction_is_trained() {
+    let sandbox = sandbox();
+    sandbox
+        .run("evolve -q -c run.toml --seed 9 -o others")
+        .ended(0, &[]);
+    let train = format!("train --robots top:2 {LITTLE} --task 1|3");
+    let said = sandbox
+        .run(&format!("{train} -a walkers others -o both"))
+        .ended(0, &["the highest of all gaits"]);
+    let parent = sandbox.run_file("both").elites[0].parent.clone().unwrap();
+    assert!(said.err.contains(&parent), "{}", said.err);
+    let of = ["walkers", "others"].map(|run| sandbox.run_file(run));
+    let is_there = |run: &RunFile| run.elites.iter().any(|elite| elite.id == parent);
+    let source = of.iter().position(is_there).expect("a gait of one of them");
+    // As if this gait had been named.
+    let alone = ["walkers", "others"][source];
+    sandbox
+        .run(&format!(
+            "{} -q -a {alone} --robots {parent} -o alone",
+            train.replace("--robots top:2 ", "")
+        ))
+        .ended(0, &[]);
+    assert_eq!(
+        sandbox.run_file("both").elites[0].body,
+        sandbox.run_file("alone").elites[0].body
+    );
 }

@@ -264,7 +264,7 @@ fn with_26_classes_nothing_on_the_page_covers_anything_else() {
     );
     sandbox
         .run(&format!("team {runs} --images 104"))
-        .ended(0, &["(4 known"]);
+        .ended(0, &["(416 of 416 walks known"]);
     sandbox
         .run(&format!("report -q {runs} --rollouts 1 -o runs/named.html"))
         .ended(0, &[]);

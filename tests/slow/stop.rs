@@ -230,7 +230,7 @@ fn every_command_ends_in_its_documented_way_when_a_signal_asks_it_to() {
         ),
         (
             format!(
-                "train -q -a gallery:gaits -t 0|1 --set data.dataset=builtin -o train-N {LONG}"
+                "train -q -a gallery:gaits-6 -t 0|1 --set data.dataset=builtin -o train-N {LONG}"
             ),
             End::Stopped,
         ),
