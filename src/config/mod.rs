@@ -20,9 +20,10 @@ pub(crate) use crate::config::task::TaskConfig;
 use crate::config::train::TrainConfig;
 use crate::config::validation::{LEAST, ValidationConfig};
 use crate::data::builtin::BuiltinDigits;
-use crate::data::dataset::{BUILTIN, Dataset};
+use crate::data::dataset::{BUILTIN, Dataset, GATES};
 use crate::data::description::check_names;
 use crate::data::files::check_name;
+use crate::data::gates::Gates;
 use crate::genome::{BodySpec, MutationParams};
 use crate::qd::EmitterParams;
 use crate::response::objective::GaitResponse;
@@ -41,11 +42,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// The configs that are part of the program: name and text.
-pub const BUILT_IN: [(&str, &str); 6] = [
+pub const BUILT_IN: [(&str, &str); 7] = [
     (
         "quickstart.toml",
         include_str!("../../configs/quickstart.toml"),
     ),
+    ("gates.toml", include_str!("../../configs/gates.toml")),
     ("zero_one.toml", include_str!("../../configs/zero_one.toml")),
     (
         "zero_one_published.toml",
@@ -214,6 +216,9 @@ pub struct DataConfig {
     /// The built-in digits, for `dataset = "builtin"`.
     #[serde(default)]
     pub(crate) builtin: BuiltinDigits,
+    /// The cues, for `dataset = "gates"`.
+    #[serde(default, skip_serializing_if = "Gates::is_default")]
+    pub(crate) gates: Gates,
 }
 
 impl DataConfig {
@@ -471,7 +476,12 @@ impl Config {
         check_name(&self.data.dataset).map_err(|error| Error::at_key("data.dataset", error))?;
         check_names(&self.data.class_names)
             .map_err(|error| Error::at_key("data.class_names", error))?;
-        if self.data.dataset == BUILTIN && self.data.transpose == Some(true) {
+        self.data
+            .gates
+            .validate()
+            .map_err(|error| Error::at_key("data.gates.cues", error))?;
+        let is_drawn = [BUILTIN, GATES].contains(&self.data.dataset.as_str());
+        if is_drawn && self.data.transpose == Some(true) {
             return refuse(
                 "data.transpose",
                 true.to_string(),

@@ -10,6 +10,8 @@ use crate::data::class_names::ClassNames;
 use crate::data::description::Description;
 use crate::data::files;
 use crate::data::files::{DatasetPlace, FilesError, StoredSplit};
+pub(crate) use crate::data::gates::GATES;
+use crate::data::gates::Gates;
 pub use crate::data::info::Split;
 use crate::data::info::{DatasetInfo, SplitInfo};
 use std::collections::BTreeMap;
@@ -24,6 +26,9 @@ pub enum DatasetError {
     /// Such built-in digits do not exist.
     #[error(transparent)]
     Builtin(#[from] BuiltinError),
+    /// Such gates do not exist.
+    #[error("gates: {0}")]
+    Gates(String),
     /// The folder's description is wrong.
     #[error("{}", .0.message)]
     Description(Error),
@@ -112,6 +117,7 @@ struct Loaded {
 enum Images {
     Stored(StoredSplit),
     Drawn(BuiltinDigits),
+    Gates(Gates),
 }
 
 impl Dataset {
@@ -140,6 +146,9 @@ impl Dataset {
     ) -> Result<Self, DatasetError> {
         if name == BUILTIN {
             return Dataset::builtin(BuiltinDigits::default(), wanted);
+        }
+        if name == GATES {
+            return Dataset::gates(Gates::default(), wanted);
         }
         let place = files::choose(name, given)?;
         let described = Description::read(&place.path).map_err(DatasetError::Description)?;
@@ -192,6 +201,25 @@ impl Dataset {
         })
     }
 
+    /// Makes the images of gates; those of both splits are the same.
+    ///
+    /// # Errors
+    /// Returns [`DatasetError::Gates`] if [`Gates::validate`] fails.
+    pub(crate) fn gates(gates: Gates, wanted: &[Split]) -> Result<Self, DatasetError> {
+        gates.validate().map_err(DatasetError::Gates)?;
+        let loaded = |&split: &Split| {
+            let labels = (0..=u8::MAX).take(gates.len()).collect();
+            (split, Loaded::new(labels, Images::Gates(gates)))
+        };
+        Ok(Dataset {
+            name: GATES.to_string(),
+            folder: None,
+            origin: GATES.to_string(),
+            class_names: ClassNames::of(&gates.class_names()),
+            splits: wanted.iter().map(loaded).collect(),
+        })
+    }
+
     pub(crate) fn name(&self) -> &str {
         &self.name
     }
@@ -230,6 +258,7 @@ impl Dataset {
         self.splits.get(&split).map(|loaded| match &loaded.images {
             Images::Stored(stored) => [stored.images.height, stored.images.width],
             Images::Drawn(_) => [BuiltinDigits::SIDE; 2],
+            Images::Gates(_) => [Gates::SIDE; 2],
         })
     }
 
@@ -255,6 +284,7 @@ impl Dataset {
         let image = match &self.loaded(split)?.images {
             Images::Stored(stored) => stored.images.image(index),
             Images::Drawn(digits) => digits.image(split, index),
+            Images::Gates(gates) => gates.image(index),
         };
         image.ok_or_else(|| self.no_such(split, index))
     }
@@ -319,6 +349,7 @@ impl Dataset {
         self.splits.get(&split).map(|loaded| match &loaded.images {
             Images::Stored(stored) => stored.fingerprint.clone(),
             Images::Drawn(digits) => digits.fingerprint(split),
+            Images::Gates(gates) => gates.fingerprint(),
         })
     }
 
@@ -327,7 +358,7 @@ impl Dataset {
             let [height, width] = self.size(split).expect("the split is loaded");
             let (transposed, files) = match &loaded.images {
                 Images::Stored(stored) => (stored.transposed, stored.files.clone()),
-                Images::Drawn(_) => (false, Vec::new()),
+                Images::Drawn(_) | Images::Gates(_) => (false, Vec::new()),
             };
             let fingerprint = self.fingerprint(split).expect("the split is loaded");
             let per_class = loaded
@@ -353,7 +384,7 @@ impl Dataset {
         let source = self
             .folder
             .as_ref()
-            .map_or(BUILTIN.to_string(), |folder| folder.display().to_string());
+            .map_or(self.name.clone(), |folder| folder.display().to_string());
         let (name, origin) = (self.name.clone(), self.origin.clone());
         DatasetInfo {
             name,

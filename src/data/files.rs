@@ -5,6 +5,7 @@ use crate::base::hash::{hex, sha256_hex};
 use crate::base::remedy::{Invocation, Remedy};
 use crate::data::builtin::{BUILTIN, BuiltinDigits};
 use crate::data::catalogue::FETCHABLE;
+use crate::data::gates::{GATES, Gates};
 use crate::data::idx;
 use crate::data::idx::{IdxError, IdxImages};
 use crate::data::info::{FileInfo, Split};
@@ -17,7 +18,11 @@ use std::path::{Path, PathBuf};
 
 /// Returns the height and width of the images of a published dataset, if the name is one's.
 pub(crate) fn published_size(name: &str) -> Option<[usize; 2]> {
-    (name == BUILTIN || FETCHABLE.contains(&name)).then_some([BuiltinDigits::SIDE; 2])
+    match name {
+        GATES => Some([Gates::SIDE; 2]),
+        _ if name == BUILTIN || FETCHABLE.contains(&name) => Some([BuiltinDigits::SIDE; 2]),
+        _ => None,
+    }
 }
 
 /// A folder that should hold the data.

@@ -7,6 +7,7 @@ pub mod dataset;
 pub(crate) mod description;
 pub mod fetch;
 pub mod files;
+pub(crate) mod gates;
 pub(crate) mod idx;
 #[cfg(feature = "import")]
 pub mod import;

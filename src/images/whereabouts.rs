@@ -6,7 +6,7 @@ use crate::base::files::{home_expanded, write_atomically};
 use crate::base::remedy::Remedy;
 use crate::base::session::Session;
 use crate::config::{BodyConfig, Config, DataConfig, reading};
-use crate::data::dataset::{BUILTIN, Dataset, DatasetError, Split};
+use crate::data::dataset::{BUILTIN, Dataset, DatasetError, GATES, Split};
 use crate::data::description::Description;
 use crate::data::files;
 use crate::data::files::{DatasetPlace, default_folder, places};
@@ -84,6 +84,9 @@ impl Whereabouts {
         if !config.class_names.is_empty() || config.dataset == BUILTIN {
             return Ok(ClassNames::of(&config.class_names));
         }
+        if config.dataset == GATES {
+            return Ok(ClassNames::of(&config.gates.class_names()));
+        }
         let (given, _) = self.places(config)?;
         let place = files::choose(&config.dataset, &given).map_err(DatasetError::from)?;
         let described = Description::read(&place.path)?;
@@ -115,6 +118,10 @@ impl Whereabouts {
     /// # Errors
     /// The error says what is missing or broken, where it was looked for, and what to do.
     pub fn load(&self, config: &DataConfig, wanted: &[Split]) -> Result<Dataset, Error> {
+        if config.dataset == GATES {
+            let gates = Dataset::gates(config.gates, wanted).map_err(Error::from)?;
+            return Ok(gates.called(&config.class_names));
+        }
         if config.dataset == BUILTIN {
             let digits = Dataset::builtin(config.builtin.clone(), wanted)?;
             return Ok(digits.called(&config.class_names));
@@ -176,7 +183,7 @@ impl Whereabouts {
     /// Returns the folder of the config, or else `data/<name>`, if images are looked for there.
     pub(crate) fn by_default(&self, config: &DataConfig) -> Option<PathBuf> {
         let is_known = self.data.is_some() || self.remembered(&config.dataset).ok()?.0.is_some();
-        if config.dataset == BUILTIN || is_known {
+        if [BUILTIN, GATES].contains(&config.dataset.as_str()) || is_known {
             return None;
         }
         let folder = config

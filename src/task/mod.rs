@@ -4,6 +4,7 @@ pub mod answer;
 pub(crate) mod class_names;
 pub mod evaluation;
 pub mod fitness;
+pub(crate) mod gates;
 pub(crate) mod grouping;
 pub mod margins;
 pub(crate) mod objective;

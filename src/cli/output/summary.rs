@@ -16,6 +16,7 @@ use crate::commands::evolve::EvolveOutcome;
 use crate::commands::pairs;
 use crate::commands::tasks::{Task, TaskFolders};
 use crate::commands::train;
+use crate::data::dataset::GATES;
 use crate::data::fetch::{FetchOutcome, Fetched};
 use crate::draw::report::tables::of_robot;
 use crate::robots::published::Published;
@@ -23,8 +24,12 @@ use crate::store::capacity::CapacityFile;
 use crate::store::eval::{EvalFile, RobotReport};
 use crate::store::images::{HeldOut, ImageRef};
 use crate::store::names::RUN_JSON;
+use crate::store::run::RunFile;
 use crate::store::validation::Validated;
+use crate::task::answer::Assignment;
 use crate::task::class_names::ClassNames;
+use crate::task::fitness::Group;
+use crate::task::gates::gate;
 use std::path::Path;
 
 /// The number of robots listed after an evolution.
@@ -70,6 +75,9 @@ pub(crate) fn evolution(console: &Console, finished: &EvolveOutcome, out: &Path,
         "voxels",
     ];
     console.table(&headers, &rows.collect::<Vec<_>>());
+    if run.config.data.dataset == GATES {
+        gates(console, run);
+    }
     let stats = run.stats;
     let cells = run.dimensions.possible_cells;
     console.line(&format!(
@@ -121,6 +129,34 @@ pub(crate) fn evolution(console: &Console, finished: &EvolveOutcome, out: &Path,
         &format!("morphcog replay --robot best --archive {archive}"),
     );
     console.suggest("     ", &format!("morphcog eval --archive {archive}"));
+}
+
+/// Writes which logic gates a run found, each by its fittest robot.
+fn gates(console: &Console, run: &RunFile) {
+    let (Ok(grouping), names) = (run.config.grouping(), run.config.class_names()) else {
+        return;
+    };
+    let mut rows = Vec::new();
+    for split in grouping.tasks().iter().filter(|split| !split.is_same_way()) {
+        let of_task = run
+            .elites
+            .iter()
+            .filter(|robot| split.is_called(&robot.task));
+        let Some(robot) = of_task.max_by(|a, b| a.objective.total_cmp(&b.objective)) else {
+            continue;
+        };
+        let (gate, bright) = gate(split, run.config.data.gates.cues);
+        let assignment = Assignment::from_training(split, run.fitness(), &run.answers(robot));
+        let is_first = bright.first().map(|class| split.group(*class)) == Some(Some(Group::A));
+        let side = assignment.expected(if is_first { Group::A } else { Group::B });
+        rows.push(vec![
+            gate,
+            format!("walks {} for {}", side.name(), names.list(&bright)),
+            number::fixed(robot.objective, 2),
+            robot.id.clone(),
+        ]);
+    }
+    console.table(&["gate", "true", "fitness", "robot"], &rows);
 }
 
 pub(crate) fn training(console: &Console, finished: &train::TrainOutcome, out: &Path) {
