@@ -10,6 +10,7 @@ use crate::draw::error::write_whole;
 use crate::draw::plot;
 use crate::draw::plot::{Background, Figure, PRINT};
 use crate::robots::published;
+use crate::search::gates;
 use crate::search::one_by_one::Named;
 use crate::shipped::exists;
 use crate::store::capacity::CapacityFile;
@@ -18,6 +19,7 @@ use crate::store::folder;
 use crate::store::names::METRICS;
 use crate::store::names::{CAPACITY_JSON, EVAL_JSON, RUN_JSON};
 use crate::store::run::{RunFile, different};
+use crate::store::stored_run::StoredRun;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -39,10 +41,12 @@ pub enum FigureKind {
     Accuracy,
     /// The results of `capacity`.
     Capacity,
+    /// The logic gates of a run on the dataset `gates`.
+    Gates,
 }
 
 impl FigureKind {
-    pub(crate) const ALL: [(FigureKind, &str); 7] = [
+    pub(crate) const ALL: [(FigureKind, &str); 8] = [
         (FigureKind::Body, "body"),
         (FigureKind::Spacetime, "spacetime"),
         (FigureKind::Snapshots, "snapshots"),
@@ -50,6 +54,7 @@ impl FigureKind {
         (FigureKind::Progress, "progress"),
         (FigureKind::Accuracy, "accuracy"),
         (FigureKind::Capacity, "capacity"),
+        (FigureKind::Gates, "gates"),
     ];
 
     pub(crate) fn is_of_robot(self) -> bool {
@@ -204,7 +209,7 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
         let made = |path: &PathBuf| -> Result<Made, Error> {
             let stem = stem(path, wanted.kind, &result_name(wanted.kind, path));
             Ok(Made {
-                figure: of_run(wanted.kind, path)?,
+                figure: of_run(wanted.kind, path, session)?,
                 stem,
             })
         };
@@ -348,7 +353,7 @@ fn of_robot(wanted: &PlotOptions, named: &Named) -> Result<Made, Error> {
     Ok(made(&subject.found, figure))
 }
 
-fn of_run(kind: FigureKind, path: &Path) -> Result<Figure, Error> {
+fn of_run(kind: FigureKind, path: &Path, session: &Session) -> Result<Figure, Error> {
     let maker = if kind == FigureKind::Accuracy {
         "eval"
     } else {
@@ -395,6 +400,11 @@ fn of_run(kind: FigureKind, path: &Path) -> Result<Figure, Error> {
                 }
             }
             Ok(plot::capacity(&file))
+        }
+        FigureKind::Gates => {
+            let source = StoredRun::read(path)?;
+            let found = gates::walks(&source, session)?;
+            Ok(plot::gates(&found, &source.run.name))
         }
         _ => RunFile::read(path).map(|run| plot::archive(&run)),
     }

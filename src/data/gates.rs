@@ -66,6 +66,13 @@ impl Gates {
         (index < self.len()).then(|| Grid::from_fn(Self::SIDE, Self::SIDE, pixel))
     }
 
+    /// Draws an image with cues of any brightness from 0 to 1.
+    pub(crate) fn at<const CUES: usize>(levels: [f64; CUES]) -> Grid<u8> {
+        Grid::from_fn(Self::SIDE, Self::SIDE, |_, column| {
+            (255.0 * levels[column * CUES / Self::SIDE]).round() as u8
+        })
+    }
+
     /// Returns the names of the classes: the cues in their order, 1 for bright.
     pub(crate) fn class_names(self) -> Vec<String> {
         (0..self.len())
