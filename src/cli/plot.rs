@@ -7,7 +7,7 @@ use crate::cli::choice;
 use crate::cli::choice::{Archives, ROBOTS, selected};
 use crate::cli::output::console::Console;
 use crate::cli::output::reporters::Reporter;
-use crate::cli::output::sweeps;
+use crate::cli::output::{summary, sweeps};
 use crate::cli::values::{MOST, offering, seed, whole};
 use crate::commands::plot;
 use crate::commands::plot::{FigureKind, PlotOptions};
@@ -29,6 +29,8 @@ Kinds:
              archives (seeds) make a band
   accuracy   what morphcog eval found
   capacity   what morphcog capacity found
+  gates      the logic gates of a run on the dataset gates:
+             its walks at every brightness of both cues
 
 With several robots or archives, every kind but progress makes one figure for each. accuracy and \
 capacity read eval.json and capacity.json beside run.json, or the file that --archive names.
@@ -135,5 +137,6 @@ pub(super) fn run(args: PlotArgs, console: &Console) -> Result<(), Error> {
     };
     let made = plot::plot(&wanted, &Session::new(&NEVER, &Reporter::new(console)))?;
     sweeps::differences(console, &made.progress);
+    summary::gate_walks(console, &made.gates);
     Ok(())
 }

@@ -10,7 +10,8 @@ use crate::draw::error::write_whole;
 use crate::draw::plot;
 use crate::draw::plot::{Background, Figure, PRINT};
 use crate::robots::published;
-use crate::search::gates;
+use crate::search;
+use crate::search::gates::GateWalks;
 use crate::search::one_by_one::Named;
 use crate::shipped::exists;
 use crate::store::capacity::CapacityFile;
@@ -110,6 +111,7 @@ pub struct PlotOptions {
 #[derive(Clone, Debug)]
 pub struct PlotOutcome {
     pub(crate) progress: Vec<Progress>,
+    pub(crate) gates: Vec<GateWalks>,
 }
 
 /// A figure and its file without the extension.
@@ -147,7 +149,7 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
             .iter()
             .try_for_each(|ending| folder::writable(&named(path, ending)))?;
     }
-    let mut progress = Vec::new();
+    let (mut progress, mut gates) = (Vec::new(), Vec::new());
     let write = |made: Made| -> Result<(), Error> {
         let figure = made.figure.on(wanted.background);
         let made = |ending: &&str| -> Result<(PathBuf, Vec<u8>), Error> {
@@ -194,6 +196,15 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
         let stem = folder::beside_all(&archives, &format!("plot-{}", wanted.kind));
         write(Made { figure, stem })?;
         progress = lines;
+    } else if wanted.kind == FigureKind::Gates {
+        for path in &archives {
+            let source = StoredRun::read(path)?;
+            let found = search::gates::walks(&source, session)?;
+            let figure = plot::gates(&found, &source.run.name);
+            let stem = stem(path, wanted.kind, "");
+            write(Made { figure, stem })?;
+            gates.extend(found);
+        }
     } else if wanted.kind.is_of_robot() {
         for robot in &wanted.robots {
             write(of_robot(wanted, robot)?)?;
@@ -209,7 +220,7 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
         let made = |path: &PathBuf| -> Result<Made, Error> {
             let stem = stem(path, wanted.kind, &result_name(wanted.kind, path));
             Ok(Made {
-                figure: of_run(wanted.kind, path, session)?,
+                figure: of_run(wanted.kind, path)?,
                 stem,
             })
         };
@@ -220,7 +231,7 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
         }
         all.into_iter().try_for_each(write)?;
     }
-    Ok(PlotOutcome { progress })
+    Ok(PlotOutcome { progress, gates })
 }
 
 /// Encodes a figure as PNG; notes if its resolution is lower than usual.
@@ -353,7 +364,7 @@ fn of_robot(wanted: &PlotOptions, named: &Named) -> Result<Made, Error> {
     Ok(made(&subject.found, figure))
 }
 
-fn of_run(kind: FigureKind, path: &Path, session: &Session) -> Result<Figure, Error> {
+fn of_run(kind: FigureKind, path: &Path) -> Result<Figure, Error> {
     let maker = if kind == FigureKind::Accuracy {
         "eval"
     } else {
@@ -400,11 +411,6 @@ fn of_run(kind: FigureKind, path: &Path, session: &Session) -> Result<Figure, Er
                 }
             }
             Ok(plot::capacity(&file))
-        }
-        FigureKind::Gates => {
-            let source = StoredRun::read(path)?;
-            let found = gates::walks(&source, session)?;
-            Ok(plot::gates(&found, &source.run.name))
         }
         _ => RunFile::read(path).map(|run| plot::archive(&run)),
     }

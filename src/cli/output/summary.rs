@@ -20,6 +20,7 @@ use crate::data::dataset::GATES;
 use crate::data::fetch::{FetchOutcome, Fetched};
 use crate::draw::report::tables::of_robot;
 use crate::robots::published::Published;
+use crate::search::gates::{EDGES, GateWalks};
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::{EvalFile, RobotReport};
 use crate::store::images::{HeldOut, ImageRef};
@@ -129,6 +130,28 @@ pub(crate) fn evolution(console: &Console, finished: &EvolveOutcome, out: &Path,
         &format!("morphcog replay --robot best --archive {archive}"),
     );
     console.suggest("     ", &format!("morphcog eval --archive {archive}"));
+}
+
+/// Writes where gates switch: the brightness of a cue at which the walk turns round, while the other
+/// cue is dark or bright.
+pub(crate) fn gate_walks(console: &Console, gates: &[GateWalks]) {
+    if gates.is_empty() {
+        return;
+    }
+    let row = |gate: &GateWalks| {
+        let level =
+            |level: Option<f64>| level.map_or("–".to_string(), |level| number::fixed(level, 2));
+        let about = [
+            gate.gate.clone(),
+            gate.side.name().to_string(),
+            gate.robot.clone(),
+            gate.audit.clone().unwrap_or_default(),
+        ];
+        [about, gate.switches().map(level)].concat()
+    };
+    let headers = ["gate", "true", "robot", "audit"];
+    let headers = [headers, EDGES].concat();
+    console.table(&headers, &gates.iter().map(row).collect::<Vec<_>>());
 }
 
 /// Writes which logic gates a run found, each by its fittest robot.
