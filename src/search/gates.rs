@@ -20,6 +20,7 @@ use crate::task::stimulus::stimulus;
 pub(crate) const LEVELS: usize = 11;
 
 /// A robot that computes a gate of two cues.
+#[derive(Clone, Debug)]
 pub(crate) struct GateWalks {
     /// Name of the gate.
     pub(crate) gate: String,
