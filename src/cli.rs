@@ -397,6 +397,7 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
             every,
             fps,
             look,
+            side_by_side: args.side_by_side,
             ..wanted
         },
     )?;

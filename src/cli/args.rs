@@ -25,6 +25,7 @@ use crate::commands::schema;
 use crate::config;
 use crate::data::catalogue::FETCHABLE;
 use crate::data::dataset::BUILTIN;
+use crate::data::gates::NAMES;
 use crate::draw::scene::Look;
 use crate::robots::selection::Selection;
 use crate::search::held_out_run;
@@ -377,7 +378,10 @@ pub(super) struct ReplayArgs {
     /// run.json).
     #[arg(short, long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
-    /// Width of GIF and PNG in pixels.
+    /// GIF and PNG show all images at once, not one after the other.
+    #[arg(long)]
+    pub(super) side_by_side: bool,
+    /// Width of GIF and PNG in pixels; side by side, of each walk.
     #[arg(long, default_value_t = 480, value_parser = whole::<u32>(0..=MOST))]
     pub(super) width: u32,
     /// Control steps per frame of the GIF: 1 is the robot's own time, more is faster and a smaller
@@ -461,7 +465,7 @@ Examples:
 
 #[derive(Debug, Args)]
 pub(super) struct DatasetArgs {
-    /// builtin, mnist, fashion-mnist, or a name of your own.
+    /// builtin, gates, mnist, fashion-mnist, or a name of your own.
     #[arg(default_value = BUILTIN, value_parser = dataset(), hide_possible_values = true)]
     pub(super) dataset: String,
     /// Folder with the files.
@@ -485,7 +489,7 @@ fn config_or_file() -> impl TypedValueParser<Value = String> {
 /// Parses the name of a dataset, which may be the user's own.
 fn dataset() -> impl TypedValueParser<Value = String> {
     offering(
-        [BUILTIN].into_iter().chain(FETCHABLE),
+        [BUILTIN].into_iter().chain(NAMES).chain(FETCHABLE),
         StringValueParser::new(),
     )
 }

@@ -20,10 +20,9 @@ pub(crate) use crate::config::task::TaskConfig;
 use crate::config::train::TrainConfig;
 use crate::config::validation::{LEAST, ValidationConfig};
 use crate::data::builtin::BuiltinDigits;
-use crate::data::dataset::{BUILTIN, Dataset, GATES};
+use crate::data::dataset::{Dataset, is_drawn};
 use crate::data::description::check_names;
 use crate::data::files::check_name;
-use crate::data::gates::Gates;
 use crate::genome::{BodySpec, MutationParams};
 use crate::qd::EmitterParams;
 use crate::response::objective::GaitResponse;
@@ -216,9 +215,6 @@ pub struct DataConfig {
     /// The built-in digits, for `dataset = "builtin"`.
     #[serde(default)]
     pub(crate) builtin: BuiltinDigits,
-    /// The cues, for `dataset = "gates"`.
-    #[serde(default, skip_serializing_if = "Gates::is_default")]
-    pub(crate) gates: Gates,
 }
 
 impl DataConfig {
@@ -476,12 +472,7 @@ impl Config {
         check_name(&self.data.dataset).map_err(|error| Error::at_key("data.dataset", error))?;
         check_names(&self.data.class_names)
             .map_err(|error| Error::at_key("data.class_names", error))?;
-        self.data
-            .gates
-            .validate()
-            .map_err(|error| Error::at_key("data.gates.cues", error))?;
-        let is_drawn = [BUILTIN, GATES].contains(&self.data.dataset.as_str());
-        if is_drawn && self.data.transpose == Some(true) {
+        if is_drawn(&self.data.dataset) && self.data.transpose == Some(true) {
             return refuse(
                 "data.transpose",
                 true.to_string(),

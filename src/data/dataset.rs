@@ -10,7 +10,6 @@ use crate::data::class_names::ClassNames;
 use crate::data::description::Description;
 use crate::data::files;
 use crate::data::files::{DatasetPlace, FilesError, StoredSplit};
-pub(crate) use crate::data::gates::GATES;
 use crate::data::gates::Gates;
 pub use crate::data::info::Split;
 use crate::data::info::{DatasetInfo, SplitInfo};
@@ -26,9 +25,6 @@ pub enum DatasetError {
     /// Such built-in digits do not exist.
     #[error(transparent)]
     Builtin(#[from] BuiltinError),
-    /// Such gates do not exist.
-    #[error("gates: {0}")]
-    Gates(String),
     /// The folder's description is wrong.
     #[error("{}", .0.message)]
     Description(Error),
@@ -120,6 +116,11 @@ enum Images {
     Gates(Gates),
 }
 
+/// Returns true if the program draws the images of a dataset of this name itself.
+pub(crate) fn is_drawn(name: &str) -> bool {
+    name == BUILTIN || Gates::named(name).is_some()
+}
+
 impl Dataset {
     /// Loads the wanted splits of a dataset: "builtin" (the default [`BuiltinDigits`]), "mnist",
     /// "fashion-mnist", or any other name for the user's own IDX files. The files must be in the
@@ -147,8 +148,8 @@ impl Dataset {
         if name == BUILTIN {
             return Dataset::builtin(BuiltinDigits::default(), wanted);
         }
-        if name == GATES {
-            return Dataset::gates(Gates::default(), wanted);
+        if let Some(gates) = Gates::named(name) {
+            return Ok(Dataset::gates(name, gates, wanted));
         }
         let place = files::choose(name, given)?;
         let described = Description::read(&place.path).map_err(DatasetError::Description)?;
@@ -202,22 +203,18 @@ impl Dataset {
     }
 
     /// Makes the images of gates; those of both splits are the same.
-    ///
-    /// # Errors
-    /// Returns [`DatasetError::Gates`] if [`Gates::validate`] fails.
-    pub(crate) fn gates(gates: Gates, wanted: &[Split]) -> Result<Self, DatasetError> {
-        gates.validate().map_err(DatasetError::Gates)?;
+    pub(crate) fn gates(name: &str, gates: Gates, wanted: &[Split]) -> Self {
         let loaded = |&split: &Split| {
             let labels = (0..=u8::MAX).take(gates.len()).collect();
             (split, Loaded::new(labels, Images::Gates(gates)))
         };
-        Ok(Dataset {
-            name: GATES.to_string(),
+        Dataset {
+            name: name.to_string(),
             folder: None,
-            origin: GATES.to_string(),
+            origin: name.to_string(),
             class_names: ClassNames::of(&gates.class_names()),
             splits: wanted.iter().map(loaded).collect(),
-        })
+        }
     }
 
     pub(crate) fn name(&self) -> &str {

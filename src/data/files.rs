@@ -5,7 +5,7 @@ use crate::base::hash::{hex, sha256_hex};
 use crate::base::remedy::{Invocation, Remedy};
 use crate::data::builtin::{BUILTIN, BuiltinDigits};
 use crate::data::catalogue::FETCHABLE;
-use crate::data::gates::{GATES, Gates};
+use crate::data::gates::Gates;
 use crate::data::idx;
 use crate::data::idx::{IdxError, IdxImages};
 use crate::data::info::{FileInfo, Split};
@@ -16,13 +16,14 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Returns the height and width of the images of a published dataset, if the name is one's.
-pub(crate) fn published_size(name: &str) -> Option<[usize; 2]> {
-    match name {
-        GATES => Some([Gates::SIDE; 2]),
-        _ if name == BUILTIN || FETCHABLE.contains(&name) => Some([BuiltinDigits::SIDE; 2]),
-        _ => None,
-    }
+/// Returns the height and width of the images of a dataset that the program knows by its name.
+pub(crate) fn known_size(name: &str) -> Option<[usize; 2]> {
+    let side = match Gates::named(name) {
+        Some(_) => Gates::SIDE,
+        None if name == BUILTIN || FETCHABLE.contains(&name) => BuiltinDigits::SIDE,
+        None => return None,
+    };
+    Some([side; 2])
 }
 
 /// A folder that should hold the data.

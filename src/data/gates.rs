@@ -3,48 +3,27 @@
 
 use crate::base::Grid;
 use crate::base::hash::sha256_hex;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-/// Name of the dataset.
-pub(crate) const GATES: &str = "gates";
+/// Names of the datasets of two, three and four cues.
+pub(crate) const NAMES: [&str; 3] = ["gates", "gates-3", "gates-4"];
 
-/// Most cues: the combinations of eight are as many as there are classes.
-const MOST: usize = 8;
-
-/// The cues of the dataset `gates`: strips of the image from left to right. The class of an image
-/// is the number that its cues make, the first being the most significant bit; training and test
-/// images are the same.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
+/// The cues of a dataset: strips of the image from left to right. The class of an image is the
+/// number that its cues make, the first being the most significant bit; training and test images
+/// are the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Gates {
-    /// Number of cues. Default 2.
-    #[schemars(range(min = 2, max = MOST))]
+    /// Number of cues, 2 to 4.
     pub(crate) cues: usize,
 }
 
-impl Default for Gates {
-    fn default() -> Self {
-        Gates { cues: 2 }
-    }
-}
-
 impl Gates {
-    pub(crate) const SIDE: usize = 28;
+    /// Side of the images: strips of two, three and four cues are as wide as each other.
+    pub(crate) const SIDE: usize = 24;
 
-    pub(crate) fn is_default(&self) -> bool {
-        *self == Gates::default()
-    }
-
-    /// Checks the number of cues.
-    ///
-    /// # Errors
-    /// Returns the text that says what was expected.
-    pub(crate) fn validate(self) -> Result<(), String> {
-        match (2..=MOST).contains(&self.cues) {
-            true => Ok(()),
-            false => Err(format!("expected 2 to {MOST} cues, found {}", self.cues)),
-        }
+    /// Returns the cues of the dataset of a name; `None` if that is no dataset of gates.
+    pub(crate) fn named(name: &str) -> Option<Gates> {
+        let place = NAMES.iter().position(|known| *known == name)?;
+        Some(Gates { cues: 2 + place })
     }
 
     /// Returns the number of images in each split.
@@ -57,7 +36,7 @@ impl Gates {
         class >> (self.cues - 1 - cue) & 1 == 1
     }
 
-    /// Draws the image at an index, 28 × 28, 0 dark, 255 bright; `None` beyond the end.
+    /// Draws the image at an index, 24 × 24, 0 dark, 255 bright; `None` beyond the end.
     pub(crate) fn image(self, index: usize) -> Option<Grid<u8>> {
         let pixel = |_, column: usize| {
             let cue = column * self.cues / Self::SIDE;
@@ -80,7 +59,7 @@ impl Gates {
             .collect()
     }
 
-    /// Returns the SHA-256 of the parameters.
+    /// Returns the SHA-256 of what the images show.
     pub(crate) fn fingerprint(self) -> String {
         sha256_hex(format!("gates; {} cues in strips", self.cues).as_bytes())
     }
@@ -92,14 +71,14 @@ mod tests {
 
     #[test]
     fn every_combination_of_cues_has_an_image_in_strips_and_a_name() {
-        let gates = Gates { cues: 3 };
+        let gates = Gates::named("gates-3").unwrap();
         assert_eq!(gates.class_names()[6], "110");
         let image = gates.image(6).unwrap();
         let row = image.rows().nth(13).unwrap();
-        assert_eq!((row[0], row[14], row[27]), (255, 255, 0));
+        assert_eq!((row[0], row[15], row[16]), (255, 255, 0));
         assert!(gates.image(8).is_none());
-        for cues in [1, 9] {
-            assert!(Gates { cues }.validate().is_err());
+        for name in ["gates-2", "gates-5", "Gates", "gates-"] {
+            assert_eq!(Gates::named(name), None, "{name}");
         }
     }
 }

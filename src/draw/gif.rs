@@ -1,14 +1,14 @@
 //! Animated GIFs of recordings, with one palette; each frame stores only the pixels that changed.
 
 use crate::base::threads::in_pool;
+use crate::draw::colour;
 use crate::draw::colour::Colour;
 use crate::draw::error::{PictureError, write_whole};
+use crate::draw::film::{Film, Moment};
 use crate::draw::palette::Palette;
 use crate::draw::panel::present;
 use crate::draw::scene::Look;
-use crate::draw::stage::Stage;
 use crate::draw::walk::Walk;
-use crate::draw::{colour, raster};
 use crate::task::recording::Recording;
 use ::gif::{DisposalMethod, Encoder, Frame, Repeat};
 use rayon::prelude::*;
@@ -16,7 +16,8 @@ use std::path::Path;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct GifOptions {
-    /// Width in pixels ([`stage::WIDTHS`](crate::draw::stage::WIDTHS)); the body gives the height.
+    /// Width in pixels ([`stage::WIDTHS`](crate::draw::stage::WIDTHS)) of the picture, or of each
+    /// side by side; the body gives the height.
     pub(crate) width: u32,
     /// Frames per second, at most 50 (GIFs count hundredths of a second; viewers slow faster ones).
     pub(crate) fps: f64,
@@ -26,6 +27,8 @@ pub(crate) struct GifOptions {
     pub(crate) look: Look,
     /// The seconds for which the last frame of each phase stays.
     pub(crate) hold: f64,
+    /// True if all rollouts are shown at once.
+    pub(crate) side_by_side: bool,
 }
 
 impl Default for GifOptions {
@@ -36,6 +39,7 @@ impl Default for GifOptions {
             every: 1,
             look: Look::Plain,
             hold: 0.6,
+            side_by_side: false,
         }
     }
 }
@@ -56,32 +60,20 @@ pub(crate) fn write(
     write_whole(path, &encode(recording, options)?)
 }
 
-/// Returns the frames to draw: every `every`-th of each phase, and each phase's last.
-pub(crate) fn shown(walk: &Walk, every: usize) -> Vec<usize> {
-    let mut frames = Vec::new();
-    for phase in 0..walk.recording().phases.len() {
-        let range = walk.phase_frames(phase);
-        let last = range.end - 1;
-        frames.extend(range.step_by(every.max(1)).filter(|f| *f != last));
-        frames.push(last);
-    }
-    frames
-}
-
 pub(crate) fn encode(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, PictureError> {
     in_pool(|| encoded(recording, options))?
 }
 
 fn encoded(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, PictureError> {
     let walk = Walk::new(recording)?;
-    let stage = Stage::new(&walk, options.width)?.crisp().look(options.look);
-    let frames = shown(&walk, options.every);
-    let palette = palette(&walk, &stage, &frames)?;
+    let film = Film::new(&walk, options.width, options.look, options.side_by_side)?.crisp();
+    let moments = film.moments(options.every);
+    let palette = palette(&film, &moments)?;
     let unchanged = palette.colours().len() as u8;
     // The last entry is never drawn: its index means "unchanged".
     let colours = [palette.colours(), &[[0, 0, 0]]].concat().concat();
     let failed = |e: ::gif::EncodingError| PictureError::Encode(e.to_string());
-    let (width, height) = (stage.width as u16, stage.height as u16);
+    let [width, height] = film.size().map(|side| side as u16);
     let mut encoder = Encoder::new(Vec::new(), width, height, &colours).map_err(failed)?;
     encoder
         .set_repeat(Repeat::Infinite)
@@ -100,12 +92,12 @@ fn encoded(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, Pictu
     let hold = centiseconds(options.hold);
     let mut number = 0;
     let mut before: Vec<u8> = Vec::new();
-    for batch in frames.chunks(BATCH) {
+    for batch in moments.chunks(BATCH) {
         // In parallel but in order, and only one batch in memory.
         let mut images = vec![before];
         let batch_images: Vec<_> = batch
             .par_iter()
-            .map(|f| indexed(&walk, &stage, &palette, *f))
+            .map(|moment| indexed(&film, &palette, moment))
             .collect();
         for image in batch_images {
             images.push(image?);
@@ -114,9 +106,8 @@ fn encoded(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, Pictu
         let encoded = pairs
             .par_iter()
             .map(|p| difference(&p[0], &p[1], width, height, unchanged));
-        for (f, mut encoded) in batch.iter().zip(encoded.collect::<Vec<_>>()) {
-            let is_last = f + 1 == walk.phase_frames(walk.phase_index(*f)).end;
-            encoded.delay = if is_last {
+        for (moment, mut encoded) in batch.iter().zip(encoded.collect::<Vec<_>>()) {
+            encoded.delay = if moment.is_last {
                 delay(number).max(hold)
             } else {
                 delay(number)
@@ -140,11 +131,15 @@ fn encoded(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, Pictu
 /// # Errors
 /// Returns the errors of [`encode`].
 pub fn still(walk: &Walk, frame: usize, width: u32) -> Result<Vec<u8>, PictureError> {
-    let stage = Stage::new(walk, width)?.crisp();
-    let palette = palette(walk, &stage, &[frame])?;
+    let film = Film::new(walk, width, Look::Plain, false)?.crisp();
+    let moment = Moment {
+        frames: vec![frame],
+        is_last: true,
+    };
+    let palette = palette(&film, std::slice::from_ref(&moment))?;
     let failed = |e: ::gif::EncodingError| PictureError::Encode(e.to_string());
-    let (width, height) = (stage.width as u16, stage.height as u16);
-    let buffer = indexed(walk, &stage, &palette, frame)?.into();
+    let [width, height] = film.size().map(|side| side as u16);
+    let buffer = indexed(&film, &palette, &moment)?.into();
     let mut encoder =
         Encoder::new(Vec::new(), width, height, &palette.colours().concat()).map_err(failed)?;
     encoder
@@ -160,7 +155,7 @@ pub fn still(walk: &Walk, frame: usize, width: u32) -> Result<Vec<u8>, PictureEr
         .map_err(|e| PictureError::Encode(e.to_string()))
 }
 
-fn palette(walk: &Walk, stage: &Stage, frames: &[usize]) -> Result<Palette, PictureError> {
+fn palette(film: &Film, moments: &[Moment]) -> Result<Palette, PictureError> {
     let mut fixed: Vec<Colour> = vec![
         colour::PAPER,
         colour::INK,
@@ -169,11 +164,11 @@ fn palette(walk: &Walk, stage: &Stage, frames: &[usize]) -> Result<Palette, Pict
         colour::FAINT,
         colour::SEAM,
     ];
-    if stage.window(0).look == Look::Paper {
+    if film.look() == Look::Paper {
         fixed.extend([colour::GRID, colour::PEG]);
     }
     let [small, _, large] = colour::TONE_AREAS;
-    for material in present(&walk.recording().body) {
+    for material in present(&film.walk().recording().body) {
         fixed.extend((0..SHADES).map(|k| {
             colour::shade(
                 material,
@@ -182,25 +177,16 @@ fn palette(walk: &Walk, stage: &Stage, frames: &[usize]) -> Result<Palette, Pict
         }));
     }
     let fixed: Vec<[u8; 3]> = fixed.into_iter().map(|c| c.rgb).collect();
-    let some: Vec<usize> = frames
+    let some: Vec<&Moment> = moments
         .iter()
-        .copied()
-        .step_by(frames.len().div_ceil(SAMPLES))
+        .step_by(moments.len().div_ceil(SAMPLES))
         .collect();
-    let pictures: Result<Vec<_>, _> = some
-        .par_iter()
-        .map(|f| raster::picture(walk, *f, stage))
-        .collect();
+    let pictures: Result<Vec<_>, _> = some.par_iter().map(|moment| film.picture(moment)).collect();
     Ok(Palette::new(&fixed, pictures?.iter().map(|p| p.data())))
 }
 
-fn indexed(
-    walk: &Walk,
-    stage: &Stage,
-    palette: &Palette,
-    frame: usize,
-) -> Result<Vec<u8>, PictureError> {
-    let picture = raster::picture(walk, frame, stage)?;
+fn indexed(film: &Film, palette: &Palette, moment: &Moment) -> Result<Vec<u8>, PictureError> {
+    let picture = film.picture(moment)?;
     Ok(picture
         .data()
         .chunks_exact(4)
@@ -289,17 +275,14 @@ mod tests {
             every: 4,
             ..GifOptions::default()
         };
-        let stage = Stage::new(&walk, 320).unwrap().crisp();
+        let film = Film::new(&walk, 320, Look::Plain, false).unwrap().crisp();
         let (width, height, repeat, frames) = decode(&encode(&recording, &options).unwrap());
-        let shown = shown(&walk, 4);
-        assert_eq!(
-            (u32::from(width), u32::from(height)),
-            (stage.width, stage.height)
-        );
+        let shown = film.moments(4);
+        assert_eq!([width, height].map(u32::from), film.size());
         assert_eq!(repeat, Repeat::Infinite);
         assert_eq!(frames.len(), shown.len());
-        for ((seen, _), f) in frames.iter().zip(&shown) {
-            let full = raster::picture(&walk, *f, &stage).unwrap();
+        for ((seen, _), moment) in frames.iter().zip(&shown) {
+            let full = film.picture(moment).unwrap();
             let mut far = 0;
             let pixels = full.data().chunks(4).zip(seen.chunks(3));
             let mut sum = 0.0;
@@ -313,7 +296,7 @@ mod tests {
             let count = seen.len() as f64 / 3.0;
             assert!(
                 sum / count < 2.0 && (far as f64) < 0.002 * count,
-                "frame {f}: {} {far}",
+                "{moment:?}: {} {far}",
                 sum / count
             );
         }
@@ -323,8 +306,14 @@ mod tests {
     fn phases_play_in_order_and_their_ends_are_held() {
         let recording = simulated("33/44", 2, 10, true);
         let walk = Walk::new(&recording).unwrap();
-        assert_eq!(shown(&walk, 4), [0, 4, 8, 10, 11, 15, 19, 21]);
-        assert_eq!(shown(&walk, 0).len(), 22);
+        let film = Film::new(&walk, 320, Look::Plain, false).unwrap();
+        let moments = film.moments(4);
+        let frames: Vec<usize> = moments
+            .iter()
+            .flat_map(|moment| moment.frames.clone())
+            .collect();
+        assert_eq!(frames, [0, 4, 8, 10, 11, 15, 19, 21]);
+        assert_eq!(film.moments(0).len(), 22);
         let options = GifOptions {
             width: 320,
             every: 4,

@@ -7,7 +7,7 @@
 use crate::body::{Body, Material};
 use crate::draw::colour::{TONE_AREAS, mark, tones};
 use crate::draw::error::{PictureError, write_whole};
-use crate::draw::gif;
+use crate::draw::film;
 use crate::draw::walk::Walk;
 use crate::task::answer::THRESHOLD;
 use crate::task::class_names::ClassNames;
@@ -197,7 +197,7 @@ fn rollout(walk: &Walk, most: usize) -> Value {
 fn moments(walk: &Walk, every: usize, unit: f64) -> (Value, Vec<i16>) {
     let recording = walk.recording();
     let points = points(recording);
-    let shown = gif::shown(walk, every);
+    let shown = film::shown(walk, every);
     let origins: Vec<[f64; 2]> = shown
         .iter()
         .map(|f| walk.centre(*f).map(|v| (v * STEPS).round() / STEPS))

@@ -101,15 +101,36 @@
   }
 
   let frame = 0;
+  // All rollouts at once: `frame` goes through the longest one.
+  let together = false;
+  const GAP = 8, SEEN = 36, NARROW = 420;
+  const isFresh = phases.length > 1 && phases.every((p) => p.fresh);
+  const longest = phases.reduce((most, p, k) => (end(k) - p.first > end(most) - phases[most].first ? k : most), 0);
+  const firstFrame = () => (together ? phases[longest].first : 0), lastFrame = () => (together ? end(longest) : N) - 1;
+  const frames = () => (together ? phases.map((p, k) => Math.min(p.first + frame - firstFrame(), end(k) - 1)) : [frame]);
   const body = { voxels: rollout.voxels, sides: Drawing.sidesOf(rollout.voxels, P), areas: rollout.materials.areas, materials: rollout.materials.list };
 
   const drawWorld = () => {
-    const canvas = $("world"), width = canvas.parentElement.clientWidth - 24, groundHeight = 30;
+    const canvas = $("world"), whole = canvas.parentElement.clientWidth - 24, groundHeight = 30, band = together ? SEEN + 4 : 0;
+    const columns = together && whole > NARROW ? Math.ceil(Math.sqrt(phases.length)) : 1, across = Math.ceil(frames().length / columns);
+    const width = (whole - (columns - 1) * GAP) / columns;
     const fitting = width / (right - left), tallest = Math.min(1.1 * width, 620) / top;
     const follow = fitting < Math.min(7, tallest);
     const scale = Math.min(follow ? width / (1.7 * size + 8) : fitting, tallest, 34);
-    const surface = Math.round(top * scale), height = surface + groundHeight;
-    const ctx = fit(canvas, width, height);
+    const surface = Math.round(top * scale) + band, height = surface + groundHeight;
+    const ctx = fit(canvas, whole, across * (height + GAP) - GAP);
+    ctx.clearRect(0, 0, whole, across * (height + GAP));
+    frames().forEach((f, k) => {
+      ctx.save();
+      ctx.translate((k % columns) * (width + GAP), Math.floor(k / columns) * (height + GAP));
+      ctx.beginPath(); ctx.rect(0, 0, width, height); ctx.clip();
+      drawScene(ctx, f, { width, height, surface, scale, follow });
+      if (together) drawSeen(ctx, f);
+      ctx.restore();
+    });
+  };
+
+  const drawScene = (ctx, frame, { width, height, surface, scale, follow }) => {
     // The camera never loses a body that is hurled away.
     const far = 0.3 * width / scale, at = origin(frame, 0);
     const middle = follow ? Math.min(Math.max(path[frame], at - far), at + far) : (left + right) / 2;
@@ -117,7 +138,7 @@
     const X = (x) => Math.min(Math.max((x - x0) * scale, -9999), 9999);
     const Y = (y) => Math.min(Math.max(surface - y * scale, -9999), 9999);
     ctx.fillStyle = css("sky"); ctx.fillRect(0, 0, width, height);
-    ctx.fillStyle = css("ground"); ctx.fillRect(0, surface, width, groundHeight);
+    ctx.fillStyle = css("ground"); ctx.fillRect(0, surface, width, height - surface);
     const [first] = rolloutOf(frame), zero = origin(first, 0), begin = origin(phases[phaseOf(frame)].first, 0);
     ctx.strokeStyle = css("mark"); ctx.lineWidth = 1; ctx.setLineDash([5, 5]);
     for (const x of begin === zero ? [zero] : [zero, begin]) { ctx.beginPath(); ctx.moveTo(X(x), 0); ctx.lineTo(X(x), surface); ctx.stroke(); }
@@ -135,6 +156,19 @@
   };
 
   const gutter = 52;
+  // The image in a corner, its name, and how far the robot has moved.
+  const drawSeen = (ctx, f) => {
+    const p = phaseOf(f), { height, width } = phases[p], side = Math.max(1, Math.round(SEEN / Math.max(height, width)));
+    for (let r = 0; r < height; r++) for (let c = 0; c < width; c++) {
+      const grey = images[p].getUint8(r * width + c);
+      ctx.fillStyle = `rgb(${grey}, ${grey}, ${grey})`; ctx.fillRect(4 + c * side, 4 + r * side, side, side);
+    }
+    ctx.strokeStyle = css("faint"); ctx.lineWidth = 1; ctx.strokeRect(4, 4, width * side, height * side);
+    ctx.textBaseline = "top"; ctx.textAlign = "left"; ctx.font = "13px system-ui, sans-serif";
+    ctx.fillStyle = css("ink"); ctx.fillText(phases[p].label, width * side + 12, 4);
+    ctx.fillStyle = css("accent"); ctx.fillText(signed(moved(f)), width * side + 12, 22);
+  };
+
   const drawChart = () => {
     const canvas = $("chart"), width = canvas.parentElement.clientWidth - 24, height = 92, bottom = height - 4;
     const ctx = fit(canvas, width, height);
@@ -167,10 +201,12 @@
       if (f === first) ctx.moveTo(X(f), y); else ctx.lineTo(X(f), y);
     }
     ctx.stroke();
-    ctx.strokeStyle = css("ink"); ctx.lineWidth = 1;
-    ctx.beginPath(); ctx.moveTo(X(frame), 16); ctx.lineTo(X(frame), bottom); ctx.stroke();
-    ctx.fillStyle = css("accent"); ctx.beginPath();
-    ctx.arc(X(frame), Y(origin(frame, 0) - origin(rolloutOf.cache[frame], 0)), 4, 0, 7); ctx.fill();
+    for (const f of frames()) {
+      ctx.strokeStyle = css("ink"); ctx.lineWidth = 1;
+      ctx.beginPath(); ctx.moveTo(X(f), 16); ctx.lineTo(X(f), bottom); ctx.stroke();
+      ctx.fillStyle = css("accent"); ctx.beginPath();
+      ctx.arc(X(f), Y(origin(f, 0) - origin(rolloutOf.cache[f], 0)), 4, 0, 7); ctx.fill();
+    }
   };
   rolloutOf.cache = Array.from({ length: N }, (_, f) => rolloutOf(f)[0]);
 
@@ -185,10 +221,11 @@
     $("time").setAttribute("aria-valuetext", `${phases[p].label}, step ${step} of ${stepsIn(p)}`);
     $("world").setAttribute("aria-label", `The robot sees ${phases[p].label}; step ${step}; moved ${signed(d)} voxel lengths`);
     $("stimulus").setAttribute("aria-label", `The image as the sensors see it: ${phases[p].label}`);
-    [...$("phases").children].forEach((b, k) => b.setAttribute("aria-pressed", String(k === p)));
+    [...$("phases").children].forEach((b, k) => b.setAttribute("aria-pressed", String(together ? k === phases.length : k === p)));
+    for (const seen of document.querySelectorAll(".seen")) seen.hidden = together;
     drawWorld(); drawStimulus(); drawChart();
   };
-  const show = (f) => { frame = Math.min(Math.max(Math.round(f), 0), N - 1); draw(); };
+  const show = (f) => { frame = Math.min(Math.max(Math.round(f), firstFrame()), lastFrame()); draw(); };
 
   // Playing: 50 control steps a second at speed 1.
   let playing = false, clock = 0, at = 0, speed = 1;
@@ -196,23 +233,27 @@
     if (!playing) return;
     at += Math.min(now - clock, 100) / 1000 * 50 * speed; clock = now;
     let f = frame;
-    while (f + 1 < N && rollout.steps[f + 1] <= at) f++;
+    while (f < lastFrame() && rollout.steps[f + 1] <= at) f++;
     if (f !== frame) show(f);
-    if (f >= N - 1) { play(false); return; }
+    if (f >= lastFrame()) { play(false); return; }
     requestAnimationFrame(tick);
   };
   const play = (on) => {
     playing = on && N > 1;
     $("play").textContent = playing ? "Pause" : "Play";
     if (!playing) return;
-    if (frame >= N - 1) show(0);
+    if (frame >= lastFrame()) show(firstFrame());
     at = rollout.steps[frame]; clock = performance.now();
     requestAnimationFrame(tick);
   };
   const seek = (f) => { show(f); at = rollout.steps[frame]; };
   const halt = (f) => { play(false); seek(f); };
 
-  $("time").max = N - 1;
+  const arrange = (on) => {
+    together = on;
+    $("time").min = firstFrame(); $("time").max = lastFrame();
+  };
+  arrange(false);
   $("play").onclick = () => play(!playing);
   $("back").onclick = () => halt(frame - 1);
   $("next").onclick = () => halt(frame + 1);
@@ -222,8 +263,13 @@
   phases.forEach((p, k) => {
     const button = document.createElement("button"), far = document.createElement("span");
     button.type = "button"; button.textContent = p.label; far.textContent = signed(p.displacement ?? NaN);
-    button.append(far); button.onclick = () => seek(p.first); $("phases").append(button);
+    button.append(far); button.onclick = () => { arrange(false); seek(p.first); }; $("phases").append(button);
   });
+  if (isFresh) {
+    const button = document.createElement("button");
+    button.type = "button"; button.textContent = "Side by side";
+    button.onclick = () => { arrange(true); seek(firstFrame()); play(true); }; $("phases").append(button);
+  }
   const used = new Set(rollout.voxels.map(([m]) => m));
   rollout.materials.list.forEach((m, k) => {
     if (!used.has(k)) return;
@@ -243,9 +289,9 @@
     if (e.key === " " && !e.target.matches("button")) play(!playing);
     else if (e.key === "ArrowLeft" && !slider) halt(frame - 1);
     else if (e.key === "ArrowRight" && !slider) halt(frame + 1);
-    else if (e.key === "Home" && !slider) seek(0);
-    else if (e.key === "End" && !slider) seek(N - 1);
-    else if (e.key >= "1" && e.key <= "9" && phases[Number(e.key) - 1]) seek(phases[Number(e.key) - 1].first);
+    else if (e.key === "Home" && !slider) seek(firstFrame());
+    else if (e.key === "End" && !slider) seek(lastFrame());
+    else if (e.key >= "1" && e.key <= "9" && phases[Number(e.key) - 1]) { arrange(false); seek(phases[Number(e.key) - 1].first); }
     else return;
     e.preventDefault();
   });

@@ -6,10 +6,11 @@ use crate::base::files::{home_expanded, write_atomically};
 use crate::base::remedy::Remedy;
 use crate::base::session::Session;
 use crate::config::{BodyConfig, Config, DataConfig, reading};
-use crate::data::dataset::{BUILTIN, Dataset, DatasetError, GATES, Split};
+use crate::data::dataset::{BUILTIN, Dataset, DatasetError, Split, is_drawn};
 use crate::data::description::Description;
 use crate::data::files;
 use crate::data::files::{DatasetPlace, default_folder, places};
+use crate::data::gates::Gates;
 use crate::shipped::read_text;
 use crate::store::folder::{IfExists, RunFolder};
 use crate::store::images::{DatasetRef, ImageRef};
@@ -84,8 +85,8 @@ impl Whereabouts {
         if !config.class_names.is_empty() || config.dataset == BUILTIN {
             return Ok(ClassNames::of(&config.class_names));
         }
-        if config.dataset == GATES {
-            return Ok(ClassNames::of(&config.gates.class_names()));
+        if let Some(gates) = Gates::named(&config.dataset) {
+            return Ok(ClassNames::of(&gates.class_names()));
         }
         let (given, _) = self.places(config)?;
         let place = files::choose(&config.dataset, &given).map_err(DatasetError::from)?;
@@ -118,9 +119,9 @@ impl Whereabouts {
     /// # Errors
     /// The error says what is missing or broken, where it was looked for, and what to do.
     pub fn load(&self, config: &DataConfig, wanted: &[Split]) -> Result<Dataset, Error> {
-        if config.dataset == GATES {
-            let gates = Dataset::gates(config.gates, wanted).map_err(Error::from)?;
-            return Ok(gates.called(&config.class_names));
+        if let Some(gates) = Gates::named(&config.dataset) {
+            let images = Dataset::gates(&config.dataset, gates, wanted);
+            return Ok(images.called(&config.class_names));
         }
         if config.dataset == BUILTIN {
             let digits = Dataset::builtin(config.builtin.clone(), wanted)?;
@@ -183,7 +184,7 @@ impl Whereabouts {
     /// Returns the folder of the config, or else `data/<name>`, if images are looked for there.
     pub(crate) fn by_default(&self, config: &DataConfig) -> Option<PathBuf> {
         let is_known = self.data.is_some() || self.remembered(&config.dataset).ok()?.0.is_some();
-        if [BUILTIN, GATES].contains(&config.dataset.as_str()) || is_known {
+        if is_drawn(&config.dataset) || is_known {
             return None;
         }
         let folder = config
@@ -287,7 +288,7 @@ pub(crate) fn say_transposed(dataset: &Dataset, config: &DataConfig, session: &S
 pub(crate) fn size_of(data: &DatasetRef, name: &str, loaded: &Dataset) -> Option<[usize; 2]> {
     match loaded.fingerprint(Split::Train).as_ref() == Some(&data.train_sha256) {
         true => loaded.size(Split::Train),
-        false => files::published_size(name),
+        false => files::known_size(name),
     }
 }
 

@@ -4,6 +4,7 @@
 use crate::base::Grid;
 use crate::base::error::Error;
 use crate::data::dataset::{BUILTIN, Dataset, Split};
+use crate::data::gates::Gates;
 use crate::images::whereabouts::{Whereabouts, load_dataset_of};
 use crate::serve::catalogue::RobotCatalogue;
 use crate::serve::refusal::HttpRefusal;
@@ -37,6 +38,10 @@ pub(crate) struct SetSummary {
     /// The names of the classes, from class 0.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(crate) class_names: Vec<String>,
+    /// The number of cues, each bright or dark; the class and index of an image is the number that
+    /// they make.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) cues: Option<usize>,
 }
 
 /// The test images that the page offers.
@@ -106,6 +111,7 @@ impl ImageSets {
                 name: set.name().to_string(),
                 classes: classes(set),
                 class_names: set.class_names().all().to_vec(),
+                cues: Gates::named(set.name()).map(|gates| gates.cues),
             })
             .collect()
     }

@@ -3,7 +3,7 @@
 use crate::task::fitness::Group;
 use crate::task::grouping::ClassSplit;
 
-/// Gates of two cues `a` and `b`, each with the classes for which it is true.
+/// Gates of two cues `a` and `b`, each with the inputs for which it is true.
 const OF_TWO: [(&str, &[u8]); 7] = [
     ("OR", &[1, 2, 3]),
     ("AND", &[3]),
@@ -22,10 +22,24 @@ const OF_THREE: [(&str, &[u8]); 4] = [
     ("parity", &[1, 2, 4, 7]),
 ];
 
-/// Returns the name of the gate that a split of all combinations of cues computes, and the classes
-/// for which it is true: those on the other side than all cues dark. Gates without a name are
-/// called by their truth table, from all cues bright down to all dark.
-pub(crate) fn gate(split: &ClassSplit, cues: usize) -> (String, Vec<u8>) {
+/// A truth table, computed by walking one way or the other.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Gate {
+    pub(crate) name: String,
+    /// The inputs (classes) for which it is true, in their order.
+    pub(crate) bright: Vec<u8>,
+}
+
+impl Gate {
+    pub(crate) fn is_true_for(&self, input: u8) -> bool {
+        self.bright.contains(&input)
+    }
+}
+
+/// Returns the gate that a split of all inputs computes. It is true on the other side than that of
+/// all cues dark. Without a name of its own it is called by its truth table, from all cues bright
+/// down to all dark.
+pub(crate) fn gate(split: &ClassSplit, cues: usize) -> Gate {
     let [a, b] = [Group::A, Group::B].map(|group| split.classes(group));
     let mut bright = if a.contains(&0) { b } else { a }.to_vec();
     bright.sort_unstable();
@@ -35,17 +49,12 @@ pub(crate) fn gate(split: &ClassSplit, cues: usize) -> (String, Vec<u8>) {
         _ => &[],
     };
     let name = known.iter().find(|(_, classes)| *classes == bright);
-    let table = || {
-        let bit = |class: usize| match bright.iter().any(|own| usize::from(*own) == class) {
-            true => '1',
-            false => '0',
-        };
-        (0..1 << cues).rev().map(bit).collect()
-    };
-    (
-        name.map_or_else(table, |(name, _)| (*name).to_string()),
+    let bit = |input: u8| if bright.contains(&input) { '1' } else { '0' };
+    let table = || (0..1 << cues).rev().map(bit).collect();
+    Gate {
+        name: name.map_or_else(table, |(name, _)| (*name).to_string()),
         bright,
-    )
+    }
 }
 
 #[cfg(test)]
@@ -59,7 +68,7 @@ mod tests {
         let names: Vec<String> = splits
             .tasks()
             .iter()
-            .map(|split| gate(split, 2).0)
+            .map(|split| gate(split, 2).name)
             .collect();
         let expected = ["OR", "b and not a", "a and not b", "AND", "a", "b", "XOR"];
         assert_eq!(names, expected);
@@ -69,7 +78,7 @@ mod tests {
     fn gates_of_three_cues_have_a_name_or_a_truth_table() {
         let of = |bright: &[u8]| {
             let dark: Vec<u8> = (0..8).filter(|class| !bright.contains(class)).collect();
-            gate(&Grouping::two_groups(&dark, bright).unwrap().tasks()[0], 3).0
+            gate(&Grouping::two_groups(&dark, bright).unwrap().tasks()[0], 3).name
         };
         assert_eq!(of(&[3, 5, 6, 7]), "majority");
         assert_eq!(of(&[7, 4, 2, 1]), "parity");

@@ -6,8 +6,8 @@ use crate::cli::output::console::Console;
 use crate::cli::output::player;
 use crate::commands::replay::Replay;
 use crate::draw::error::PictureError;
+use crate::draw::film::Film;
 use crate::draw::scene::Look;
-use crate::draw::stage::Stage;
 use crate::draw::walk::Walk;
 use crate::draw::{gif, html, raster};
 use crate::shipped;
@@ -77,6 +77,8 @@ pub(crate) struct PicturesWanted {
     pub(crate) fps: u32,
     /// The look of the world in GIF and PNG.
     pub(crate) look: Look,
+    /// True if GIF and PNG show all images at once.
+    pub(crate) side_by_side: bool,
 }
 
 impl Default for PicturesWanted {
@@ -87,6 +89,7 @@ impl Default for PicturesWanted {
             every: 1,
             fps: 50,
             look: Look::Plain,
+            side_by_side: false,
         }
     }
 }
@@ -173,6 +176,7 @@ pub(crate) fn make(
                     every: wanted.every,
                     fps: f64::from(wanted.fps),
                     look: wanted.look,
+                    side_by_side: wanted.side_by_side,
                     ..gif::GifOptions::default()
                 };
                 gif::write(path, recording, &options).map_err(failed)?;
@@ -180,10 +184,11 @@ pub(crate) fn make(
             Format::Html => html::write(path, recording, &title, &replay.about).map_err(failed)?,
             Format::Png => {
                 let walk = Walk::new(recording).map_err(failed)?;
-                let stage = Stage::new(&walk, wanted.width)
-                    .map_err(failed)?
-                    .look(wanted.look);
-                let picture = raster::picture(&walk, walk.frames() - 1, &stage).map_err(failed)?;
+                let film = Film::new(&walk, wanted.width, wanted.look, wanted.side_by_side);
+                let film = film.map_err(failed)?;
+                let moments = film.moments(usize::MAX);
+                let last = moments.last().expect("a walk has a frame");
+                let picture = film.picture(last).map_err(failed)?;
                 raster::write_png(path, &picture).map_err(failed)?;
             }
             Format::Terminal => {

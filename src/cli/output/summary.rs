@@ -16,21 +16,19 @@ use crate::commands::evolve::EvolveOutcome;
 use crate::commands::pairs;
 use crate::commands::tasks::{Task, TaskFolders};
 use crate::commands::train;
-use crate::data::dataset::GATES;
 use crate::data::fetch::{FetchOutcome, Fetched};
+use crate::data::gates::Gates;
 use crate::draw::report::tables::of_robot;
 use crate::robots::published::Published;
-use crate::search::gates::{EDGES, GateWalks};
+use crate::search;
+use crate::search::gates::{FoundGate, GateWalks};
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::{EvalFile, RobotReport};
 use crate::store::images::{HeldOut, ImageRef};
 use crate::store::names::RUN_JSON;
 use crate::store::run::RunFile;
 use crate::store::validation::Validated;
-use crate::task::answer::Assignment;
 use crate::task::class_names::ClassNames;
-use crate::task::fitness::Group;
-use crate::task::gates::gate;
 use std::path::Path;
 
 /// The number of robots listed after an evolution.
@@ -51,33 +49,9 @@ pub(crate) fn evolution(console: &Console, finished: &EvolveOutcome, out: &Path,
         });
         return console.event("finished", &done);
     }
-    let class_names = run.config.class_names();
-    let mut robots: Vec<_> = run.elites.iter().collect();
-    robots.sort_by(|a, b| b.objective.total_cmp(&a.objective));
-    let rows = robots.iter().take(SHOWN).map(|robot| {
-        let kinds = robot.voxels;
-        vec![
-            robot.id.clone(),
-            robot.task.clone(),
-            number::fixed(robot.objective, 2),
-            walks(&run.training_images, &robot.displacements, &class_names),
-            kinds.muscle.to_string(),
-            kinds.sensor.to_string(),
-            kinds.total.to_string(),
-        ]
-    });
-    let headers = [
-        "robot",
-        "task",
-        "fitness",
-        "displacements",
-        "muscle",
-        "sensor",
-        "voxels",
-    ];
-    console.table(&headers, &rows.collect::<Vec<_>>());
-    if run.config.data.dataset == GATES {
-        gates(console, run);
+    match search::gates::found(run, |_| true) {
+        found if found.is_empty() => fittest(console, run),
+        found => gates(console, run, &found),
     }
     let stats = run.stats;
     let cells = run.dimensions.possible_cells;
@@ -129,57 +103,99 @@ pub(crate) fn evolution(console: &Console, finished: &EvolveOutcome, out: &Path,
         "next:",
         &format!("morphcog replay --robot best --archive {archive}"),
     );
-    console.suggest("     ", &format!("morphcog eval --archive {archive}"));
+    // Test images of gates are those that they were evolved on.
+    let then = match Gates::named(&run.config.data.dataset) {
+        Some(_) => "audit",
+        None => "eval",
+    };
+    console.suggest("     ", &format!("morphcog {then} --archive {archive}"));
 }
 
-/// Writes where gates switch: the brightness of a cue at which the walk turns round, while the other
-/// cue is dark or bright.
+/// Writes what gates do under what cues and starts can do.
 pub(crate) fn gate_walks(console: &Console, gates: &[GateWalks]) {
     if gates.is_empty() {
         return;
     }
+    let levels = |levels: &[f64]| match levels {
+        [] => "–".to_string(),
+        _ => {
+            let levels: Vec<String> = levels.iter().map(|at| number::fixed(*at, 2)).collect();
+            levels.join("+")
+        }
+    };
     let row = |gate: &GateWalks| {
-        let level =
-            |level: Option<f64>| level.map_or("–".to_string(), |level| number::fixed(level, 2));
-        let about = [
-            gate.gate.clone(),
+        let [a_dark, a_bright, b_dark, b_bright] = gate.switches();
+        vec![
+            gate.gate.name.clone(),
             gate.side.name().to_string(),
             gate.robot.clone(),
-            gate.audit.clone().unwrap_or_default(),
-        ];
-        [about, gate.switches().map(level)].concat()
+            number::fixed(gate.fitness, 2),
+            gate.audit.clone().unwrap_or("–".to_string()),
+            format!("{} / {}", levels(&a_dark), levels(&a_bright)),
+            format!("{} / {}", levels(&b_dark), levels(&b_bright)),
+            format!("{} of {}", gate.starts.right, gate.starts.all),
+            format!("{} of {}", gate.changes.right, gate.changes.all),
+        ]
     };
-    let headers = ["gate", "true", "robot", "audit"];
-    let headers = [headers, EDGES].concat();
+    let headers = [
+        "gate", "true", "robot", "fitness", "audit", "a turns", "b turns", "starts", "changes",
+    ];
     console.table(&headers, &gates.iter().map(row).collect::<Vec<_>>());
+    console.line(
+        "a turns, b turns: the brightness of a cue at which the robot turns round, the other cue \
+         dark / bright",
+    );
+    console.line(
+        "starts: right from raised starts; changes: right after every change of the cues on the way",
+    );
 }
 
-/// Writes which logic gates a run found, each by its fittest robot.
-fn gates(console: &Console, run: &RunFile) {
-    let (Ok(grouping), names) = (run.config.grouping(), run.config.class_names()) else {
-        return;
-    };
-    let mut rows = Vec::new();
-    for split in grouping.tasks().iter().filter(|split| !split.is_same_way()) {
-        let of_task = run
-            .elites
-            .iter()
-            .filter(|robot| split.is_called(&robot.task));
-        let Some(robot) = of_task.max_by(|a, b| a.objective.total_cmp(&b.objective)) else {
-            continue;
-        };
-        let (gate, bright) = gate(split, run.config.data.gates.cues);
-        let assignment = Assignment::from_training(split, run.fitness(), &run.answers(robot));
-        let is_first = bright.first().map(|class| split.group(*class)) == Some(Some(Group::A));
-        let side = assignment.expected(if is_first { Group::A } else { Group::B });
-        rows.push(vec![
-            gate,
-            format!("walks {} for {}", side.name(), names.list(&bright)),
-            number::fixed(robot.objective, 2),
+/// Writes the fittest robots of a run.
+fn fittest(console: &Console, run: &RunFile) {
+    let class_names = run.config.class_names();
+    let mut robots: Vec<_> = run.elites.iter().collect();
+    robots.sort_by(|a, b| b.objective.total_cmp(&a.objective));
+    let rows = robots.iter().take(SHOWN).map(|robot| {
+        let kinds = robot.voxels;
+        vec![
             robot.id.clone(),
-        ]);
-    }
-    console.table(&["gate", "true", "fitness", "robot"], &rows);
+            robot.task.clone(),
+            number::fixed(robot.objective, 2),
+            walks(&run.training_images, &robot.displacements, &class_names),
+            kinds.muscle.to_string(),
+            kinds.sensor.to_string(),
+            kinds.total.to_string(),
+        ]
+    });
+    let headers = [
+        "robot",
+        "task",
+        "fitness",
+        "displacements",
+        "muscle",
+        "sensor",
+        "voxels",
+    ];
+    console.table(&headers, &rows.collect::<Vec<_>>());
+}
+
+/// Writes which logic gates a run found.
+fn gates(console: &Console, run: &RunFile, found: &[FoundGate]) {
+    let names = run.config.class_names();
+    let row = |found: &FoundGate| {
+        let FoundGate {
+            gate, robot, side, ..
+        } = found;
+        vec![
+            gate.name.clone(),
+            format!("{} for {}", side.name(), names.list(&gate.bright)),
+            number::fixed(robot.objective, 2),
+            walks(&run.training_images, &robot.displacements, &names),
+            robot.id.clone(),
+        ]
+    };
+    let headers = ["gate", "true: walks", "fitness", "displacements", "robot"];
+    console.table(&headers, &found.iter().map(row).collect::<Vec<_>>());
 }
 
 pub(crate) fn training(console: &Console, finished: &train::TrainOutcome, out: &Path) {

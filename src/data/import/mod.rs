@@ -24,7 +24,7 @@ use crate::base::session::Session;
 use crate::base::table;
 use crate::base::text::{counted, one_line};
 use crate::data::catalogue::FETCHABLE;
-use crate::data::dataset::BUILTIN;
+use crate::data::dataset::is_drawn;
 use crate::data::description::Description;
 use crate::data::files::{check_name, default_folder};
 use crate::data::idx;
@@ -41,9 +41,6 @@ use serde::Serialize;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-
-/// Names that datasets of users cannot have, since they mean others.
-const TAKEN: [&str; 1] = [BUILTIN];
 
 /// The table of the images' sources, in a dataset's folder.
 pub(crate) const IMAGES_CSV: &str = "images.csv";
@@ -109,11 +106,8 @@ impl ImportOptions {
             let expected = "expected a name of letters, digits, '-', '_' and '.'";
             Error::argument("name", &self.name, expected)
         })?;
-        if TAKEN
-            .iter()
-            .chain(&FETCHABLE)
-            .any(|taken| *taken == self.name)
-        {
+        let name = self.name.as_str();
+        if is_drawn(name) || FETCHABLE.contains(&name) {
             let text = "expected another name: this one means a dataset that is known";
             return Err(Error::argument("name", &self.name, text));
         }

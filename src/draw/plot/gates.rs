@@ -1,6 +1,10 @@
-//! The figure of logic gates: bodies, and how they walk at every brightness of two cues.
+//! The figure of logic gates: each gate's body, how it walks under every input (its truth table),
+//! and how at every brightness of two cues.
 
+use crate::base::number;
+use crate::body::Material;
 use crate::draw::colour;
+use crate::draw::panel::present;
 use crate::draw::plot::axes::{Axis, MARGIN, colour_bar, heading};
 use crate::draw::plot::canvas::{Canvas, Pen, TextStyle};
 use crate::draw::plot::figure::{Figure, PAGE};
@@ -11,103 +15,141 @@ use crate::search::gates::{GateWalks, LEVELS};
 const COLUMNS: usize = 4;
 
 /// Gap between panels, points.
-const GAP: f64 = 14.0;
+const GAP: f64 = 16.0;
 
-/// Height of the words above a panel's map, points.
+/// Height of the words above a panel's body and map, points.
 const WORDS: f64 = 20.0;
 
-/// Room for the names of cues at the left and below a map, points.
-const CUES: f64 = 10.0;
+/// Room for the names of cues at the left of a map and below it, points.
+const CUES: f64 = 9.0;
 
-/// Displacement at which colours are strongest, voxel lengths.
+/// Height of a row of a truth table, points.
+const ROW: f64 = 9.0;
+
+/// Displacement at which colours are strongest and bars longest, voxel lengths.
 const STRONG: f64 = 10.0;
 
-/// Plots each gate's body and a map of its walks; `of` names the run.
+/// Plots gates; `of` names their run.
 pub(crate) fn gates(all: &[GateWalks], of: &str) -> Figure {
     let mut canvas = Canvas::new();
     let top = heading(&mut canvas, "Logic gates without a neuron", of, PAGE) + 2.0;
     let panel = (PAGE - 2.0 * MARGIN - GAP * (COLUMNS - 1) as f64) / COLUMNS as f64;
-    let map = (panel - CUES) * 0.62;
-    let tall = WORDS + map + CUES + GAP;
+    let side = (panel - CUES - 6.0) / 2.0;
+    let tall = WORDS + side + CUES + 5.0 * ROW + GAP;
     for (number, gate) in all.iter().enumerate() {
         let at = [
             MARGIN + (number % COLUMNS) as f64 * (panel + GAP),
             top + (number / COLUMNS) as f64 * tall,
         ];
-        draw(&mut canvas, at, [panel, map], gate);
+        draw(&mut canvas, at, [panel, side], gate);
     }
-    let below = top + all.len().div_ceil(COLUMNS) as f64 * tall + 6.0;
+    let rows = all.len().div_ceil(COLUMNS);
+    let below = top + rows as f64 * tall;
+    let number = all.len() % COLUMNS;
+    if number > 0 {
+        // The place that is left.
+        let at = [MARGIN + number as f64 * (panel + GAP), below - tall + WORDS];
+        let used = |material: &Material| {
+            all.iter()
+                .any(|gate| present(&gate.body).any(|own| own == *material))
+        };
+        let names = Material::ALL.into_iter().filter(used);
+        let lines = names.map(|material| (material, robot::plain(material), material.name()));
+        robot::legend(&mut canvas, at, lines, panel);
+    }
     let name = "walk [voxel lengths], right positive; a dot where the gate should be true";
     let axis = Axis::exact(-STRONG, STRONG, 4);
     let shade = |walk: f64| scales::diverging(walk / STRONG);
-    let width = PAGE / 2.0;
-    colour_bar(
-        &mut canvas,
-        [MARGIN + 6.0, below],
-        width,
-        &axis,
-        name,
-        shade,
-    );
-    Figure::new(
-        &format!("Logic gates: {of}"),
-        [PAGE, below + 19.0 + MARGIN],
-        canvas,
-    )
+    let bar = [MARGIN + 6.0, below];
+    colour_bar(&mut canvas, bar, PAGE / 2.0, &axis, name, shade);
+    let size = [PAGE, below + 19.0 + MARGIN];
+    Figure::new(&format!("Logic gates: {of}"), size, canvas)
 }
 
-fn draw(canvas: &mut Canvas, [left, top]: [f64; 2], [panel, map]: [f64; 2], gate: &GateWalks) {
+fn draw(canvas: &mut Canvas, [left, top]: [f64; 2], [panel, side]: [f64; 2], gate: &GateWalks) {
     let style = TextStyle::default();
-    canvas.fitted([left, top + 7.0], &gate.gate, panel, style.bold());
-    let true_side = format!("true: {}", gate.side.name());
-    let said = match &gate.audit {
-        Some(verdict) => format!("{true_side}; {verdict}"),
-        None => true_side,
+    canvas.fitted([left, top + 7.0], &gate.gate.name, panel, style.bold());
+    let robot = match &gate.audit {
+        Some(verdict) => format!("{}, {verdict}", gate.robot),
+        None => gate.robot.clone(),
     };
-    canvas.fitted(
-        [left, top + 16.0],
-        &said,
-        panel,
-        style.colour(colour::FAINT),
-    );
-    let at = [left + CUES, top + WORDS];
-    let cell = map / LEVELS as f64;
-    // Row 0, the dark first cue, is at the bottom.
-    let squares = gate.walks.iter().map(|((row, column), walk)| {
-        let colour = match walk {
-            Some(walk) => scales::diverging(walk / STRONG),
-            None => scales::below(0.5),
-        };
-        ((LEVELS - 1 - row, column), colour)
-    });
-    robot::squares(canvas, at, cell, 0.0, squares);
-    canvas.frame(at, [map; 2], Pen::new(colour::INK, 0.6));
-    let last = LEVELS - 1;
-    for (row, column) in [(0, 0), (0, last), (last, 0), (last, last)] {
-        let [x, y] = [
-            at[0] + (column as f64 + 0.5) * cell,
-            at[1] + ((last - row) as f64 + 0.5) * cell,
-        ];
-        if gate.is_true_for(row == last, column == last) {
-            canvas.dot([x, y], 0.3 * cell, colour::INK);
-        }
-    }
-    canvas.text(
-        [at[0] + map / 2.0, at[1] + map + 8.0],
-        "b →",
-        TextStyle::middle(),
-    );
-    canvas.text([left, at[1] + map / 2.0], "a↑", TextStyle::default());
+    let faint = style.colour(colour::FAINT);
+    canvas.fitted([left, top + 16.0], &robot, panel, faint);
     let body = &gate.body;
-    let side = panel - CUES - map - 8.0;
     let voxel = side / body.height().max(body.width()).max(1) as f64;
-    let corner = [at[0] + map + 8.0, at[1]];
+    let corner = [left, top + WORDS];
     let voxels = body
         .voxels()
         .iter()
         .map(|(place, material)| (place, robot::plain(*material)));
     robot::squares(canvas, corner, voxel, 0.05 * voxel, voxels);
     robot::body_outline(canvas, corner, voxel, body, Pen::new(colour::INK, 0.5));
-    let words = [corner[0], corner[1] + side + 9.0];
-    canvas.fitted(words, &gate.robot, side, style.colour(colour::FAINT));
+    map(canvas, [left + panel - side, top + WORDS], side, gate);
+    let below = top + WORDS + side + CUES;
+    table(canvas, [left, below], panel, gate);
+    let GateWalks {
+        starts, changes, ..
+    } = gate;
+    let kept = format!(
+        "raised starts {}/{}, changes {}/{}",
+        starts.right, starts.all, changes.right, changes.all
+    );
+    canvas.fitted([left, below + 5.0 * ROW - 1.0], &kept, panel, faint);
+}
+
+/// Draws the walks at every brightness; the first cue rises upwards, the second to the right.
+fn map(canvas: &mut Canvas, at: [f64; 2], side: f64, gate: &GateWalks) {
+    let cell = side / LEVELS as f64;
+    let last = LEVELS - 1;
+    let squares = gate.walks.iter().map(|((row, column), walk)| {
+        let colour = match walk {
+            Some(walk) => scales::diverging(walk / STRONG),
+            None => scales::below(0.5),
+        };
+        ((last - row, column), colour)
+    });
+    robot::squares(canvas, at, cell, 0.0, squares);
+    canvas.frame(at, [side; 2], Pen::new(colour::INK, 0.6));
+    for &input in &gate.gate.bright {
+        let (a, b) = (input & 2 != 0, input & 1 != 0);
+        let along = |is_bright: bool| (last as f64 * f64::from(u8::from(is_bright)) + 0.5) * cell;
+        let dot = [at[0] + along(b), at[1] + side - along(a)];
+        canvas.dot(dot, 0.3 * cell, colour::INK);
+    }
+    let middle = TextStyle::middle();
+    canvas.text([at[0] + side / 2.0, at[1] + side + 7.0], "b →", middle);
+    canvas.text([at[0] - 5.0, at[1] + side / 2.0], "a", middle);
+    canvas.text([at[0] - 5.0, at[1] + side / 2.0 - 7.0], "↑", middle);
+}
+
+/// Draws a truth table: a bar for the walk under each input, to the left or right.
+fn table(canvas: &mut Canvas, [left, top]: [f64; 2], panel: f64, gate: &GateWalks) {
+    let style = TextStyle::default();
+    let (labels, numbers) = (16.0, 20.0);
+    let half = (panel - labels - numbers) / 2.0;
+    let zero = left + labels + half;
+    for input in 0..4_u8 {
+        let y = top + f64::from(input) * ROW;
+        let is_true = gate.gate.is_true_for(input);
+        let name = match is_true {
+            true => style.bold(),
+            false => style,
+        };
+        canvas.text([left, y + 7.0], &format!("{input:02b}"), name);
+        let Some(walk) = gate.walk(input) else {
+            canvas.text([zero, y + 7.0], "unstable", TextStyle::middle());
+            continue;
+        };
+        let long = half * (walk / STRONG).clamp(-1.0, 1.0);
+        let at = [zero + long.min(0.0), y + 1.5];
+        canvas.rectangle(
+            at,
+            [long.abs(), ROW - 3.0],
+            scales::diverging(walk / STRONG),
+        );
+        let text = number::fixed(walk, 1);
+        canvas.text([left + panel, y + 7.0], &text, TextStyle::end());
+    }
+    let axis = Pen::new(colour::FAINT, 0.5);
+    canvas.line([zero, top], [zero, top + 4.0 * ROW], axis);
 }

@@ -9,7 +9,7 @@ use crate::base::shell::in_shell;
 use crate::config::capacity::CapacityConfig;
 use crate::config::train::TrainConfig;
 use crate::config::{Config, Settings, flatten};
-use crate::data::dataset::BUILTIN;
+use crate::data::dataset::is_drawn;
 use crate::draw::html::escape;
 use crate::draw::report::Spell;
 use crate::search::held_out_run;
@@ -345,7 +345,7 @@ fn made_by(dossier: &Dossier, again: &Path, spell: Spell) -> Vec<String> {
         };
         let name = &run.dataset.name;
         let evolve = Invocation::new("evolve").option("config", config);
-        let (images, evolve) = match name == BUILTIN {
+        let (images, evolve) = match is_drawn(name) {
             true => (None, evolve),
             false => {
                 let images = format!("# IMAGES: the folder with the files of {name}");

@@ -32,7 +32,25 @@ export class Images {
       button.onclick = () => this.show(label);
       return button;
     }));
+    this.switches();
     await this.show(this.set.classes.some(([label]) => label === this.class) ? this.class : this.set.classes[0][0]);
+  }
+
+  // Images of cues are switched one cue at a time, and a walk goes on meanwhile.
+  switches() {
+    const cues = this.set.cues ?? 0;
+    if (cues || !$("cues").hidden) $("manner").value = cues ? "on" : "fresh";
+    $("cues").hidden = !cues;
+    for (const id of ["classes", "thumbs", "newer", "older", "lucky"]) $(id).hidden = !!cues;
+    $("cues").replaceChildren(...Array.from({ length: cues }, (_, cue) => {
+      const button = element("button", { type: "button" }), bit = 1 << (cues - 1 - cue);
+      button.dataset.bit = bit;
+      button.onclick = async () => {
+        await this.show(this.class ^ bit);
+        this.choose(this.shown[0]);
+      };
+      return button;
+    }));
   }
 
   get total() { return this.set.classes.find(([label]) => label === this.class)?.[1] ?? 0; }
@@ -54,6 +72,11 @@ export class Images {
   }
 
   draw() {
+    for (const button of $("cues").children) {
+      const is = !!(this.class & button.dataset.bit);
+      button.textContent = `Cue ${"abcd"[[...$("cues").children].indexOf(button)]}: ${is ? "bright" : "dark"}`;
+      button.setAttribute("aria-pressed", String(is));
+    }
     const ink = hex(css("ink"));
     $("thumbs").replaceChildren(...(this.shown ?? []).map((image) => {
       const canvas = element("canvas"), what = this.names.a(image.label), label = `${what[0].toUpperCase()}${what.slice(1)}, image ${image.index}`;

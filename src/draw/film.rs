@@ -1,0 +1,154 @@
+//! [`Film`]: the pictures of a recording: one image's rollout after the other, or the same moment
+//! of all rollouts side by side.
+
+use crate::draw::colour;
+use crate::draw::error::PictureError;
+use crate::draw::raster;
+use crate::draw::scene::Look;
+use crate::draw::stage::Stage;
+use crate::draw::walk::Walk;
+use tiny_skia::{Pixmap, PixmapPaint, Transform};
+
+/// Line between pictures side by side, pixels.
+const GAP: u32 = 2;
+
+/// A picture of a film.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Moment {
+    /// The frame of each picture side by side.
+    pub(crate) frames: Vec<usize>,
+    /// True for the last moment of a phase.
+    pub(crate) is_last: bool,
+}
+
+/// Returns every `every`-th of some steps, and the last.
+fn steps(length: usize, every: usize) -> impl Iterator<Item = usize> {
+    let last = length.saturating_sub(1);
+    let steps = (0..length).step_by(every.max(1));
+    steps.filter(move |step| *step != last).chain([last])
+}
+
+/// Returns the frames to draw: every `every`-th of each phase, and each phase's last.
+pub(crate) fn shown(walk: &Walk, every: usize) -> Vec<usize> {
+    let phases = (0..walk.recording().phases.len()).map(|phase| walk.phase_frames(phase));
+    phases
+        .flat_map(|frames| steps(frames.len(), every).map(move |step| frames.start + step))
+        .collect()
+}
+
+/// How the pictures of a recording are laid out.
+pub(crate) struct Film<'a> {
+    walk: &'a Walk<'a>,
+    stage: Stage,
+    side_by_side: bool,
+}
+
+impl<'a> Film<'a> {
+    /// Creates a film of pictures that are `width` pixels wide, each of those side by side.
+    ///
+    /// # Errors
+    /// Returns an error if the width is out of range, or if rollouts are wanted side by side that
+    /// follow each other.
+    pub(crate) fn new(
+        walk: &'a Walk<'a>,
+        width: u32,
+        look: Look,
+        side_by_side: bool,
+    ) -> Result<Self, PictureError> {
+        let phases = walk.recording().phases.len();
+        if side_by_side && !(0..phases).all(|phase| walk.is_fresh(phase)) {
+            return Err(PictureError::Recording(
+                "expected a fresh rollout for every image, to show them side by side",
+            ));
+        }
+        Ok(Film {
+            walk,
+            stage: Stage::new(walk, width)?.look(look),
+            side_by_side,
+        })
+    }
+
+    /// Gives voxels hard edges.
+    pub(crate) fn crisp(self) -> Self {
+        Film {
+            stage: self.stage.crisp(),
+            ..self
+        }
+    }
+
+    pub(crate) fn look(&self) -> Look {
+        self.stage.window(0).look
+    }
+
+    pub(crate) fn walk(&self) -> &'a Walk<'a> {
+        self.walk
+    }
+
+    /// Returns the numbers of pictures beside each other and below each other.
+    fn grid(&self) -> [u32; 2] {
+        let tiles = match self.side_by_side {
+            true => self.walk.recording().phases.len() as u32,
+            false => 1,
+        };
+        let columns = (1..tiles).find(|n| n * n >= tiles).unwrap_or(1);
+        [columns, tiles.div_ceil(columns)]
+    }
+
+    /// Returns width and height in pixels.
+    pub(crate) fn size(&self) -> [u32; 2] {
+        let [columns, rows] = self.grid();
+        let along = |count: u32, side: u32| count * (side + GAP) - GAP;
+        [
+            along(columns, self.stage.width),
+            along(rows, self.stage.height),
+        ]
+    }
+
+    /// Returns the moments to draw: every `every`-th of each phase, and each phase's last. Side by
+    /// side, a rollout that ends before others stays as it ended.
+    pub(crate) fn moments(&self, every: usize) -> Vec<Moment> {
+        let walk = self.walk;
+        if !self.side_by_side {
+            let of = |frame: usize| Moment {
+                frames: vec![frame],
+                is_last: frame + 1 == walk.phase_frames(walk.phase_index(frame)).end,
+            };
+            return shown(walk, every).into_iter().map(of).collect();
+        }
+        let phases = (0..walk.recording().phases.len()).map(|phase| walk.phase_frames(phase));
+        let phases: Vec<_> = phases.collect();
+        let longest = phases.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
+        let at = |step: usize| Moment {
+            frames: phases
+                .iter()
+                .map(|frames| (frames.start + step).min(frames.end - 1))
+                .collect(),
+            is_last: step + 1 == longest,
+        };
+        steps(longest, every).map(at).collect()
+    }
+
+    /// Renders a moment as opaque RGBA.
+    pub(crate) fn picture(&self, moment: &Moment) -> Result<Pixmap, PictureError> {
+        let tile = |frame: usize| raster::picture(self.walk, frame, &self.stage);
+        if let [frame] = moment.frames[..] {
+            return tile(frame);
+        }
+        let ([columns, _], [width, height]) = (self.grid(), self.size());
+        let mut all = Pixmap::new(width, height).ok_or(PictureError::Size { width, height })?;
+        let [red, green, blue] = colour::GROUND_LINE.rgb;
+        all.fill(tiny_skia::Color::from_rgba8(red, green, blue, 255));
+        for (number, frame) in (0..).zip(&moment.frames) {
+            let at = |place: u32, side: u32| (place * (side + GAP)) as i32;
+            all.draw_pixmap(
+                at(number % columns, self.stage.width),
+                at(number / columns, self.stage.height),
+                tile(*frame)?.as_ref(),
+                &PixmapPaint::default(),
+                Transform::identity(),
+                None,
+            );
+        }
+        Ok(all)
+    }
+}
