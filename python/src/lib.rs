@@ -531,7 +531,7 @@ impl RunData {
         let options = eval::EvalOptions {
             archives: vec![self.place.clone()],
             robots: parsed("robots", robots)?,
-            images: parsed("images", images)?,
+            images: Some(parsed("images", images)?),
             split,
             validation: None,
             seed: 1,

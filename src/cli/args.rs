@@ -310,9 +310,10 @@ pub(super) struct EvolveArgs {
 pub(super) struct EvalArgs {
     #[command(flatten)]
     pub(super) archives: Archives,
-    /// Number of images in all, equally many per class; or "all": every image of the classes.
-    #[arg(short = 'n', long, default_value_t = HowMany::Evenly(1000))]
-    pub(super) images: HowMany,
+    /// Number of images in all, equally many per class; or "all": every image of the classes
+    /// (default: 1000, or all if there are fewer).
+    #[arg(short = 'n', long)]
+    pub(super) images: Option<HowMany>,
     /// Which images: test, or validation (of the training split, neither trained on nor chosen
     /// from), to compare robots while the test images stay unused.
     #[arg(long, default_value_t = HeldOut::Test, value_name = "SPLIT", value_parser = held_out())]

@@ -99,7 +99,7 @@ pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
         out: archive.with_file_name(EVAL_JSON),
         archives: vec![archive],
         robots: options.robots,
-        images: HowMany::Evenly(TEST_IMAGES),
+        images: Some(HowMany::Evenly(TEST_IMAGES)),
         split: HeldOut::Test,
         validation: None,
         seed: args.seed,

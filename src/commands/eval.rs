@@ -44,8 +44,8 @@ pub struct EvalOptions {
     pub archives: Vec<PathBuf>,
     /// The robots to evaluate.
     pub robots: Selection,
-    /// Number of images.
-    pub images: HowMany,
+    /// Number of images; `None`: 1000, or all test images if there are fewer.
+    pub images: Option<HowMany>,
     /// Split of the images.
     pub split: HeldOut,
     /// Number of validation images to choose robots by; `None`: as the config says.
@@ -212,8 +212,8 @@ pub(crate) fn differing(
     cycle_steps: u32,
 ) -> Vec<(&'static str, String, String)> {
     let images = match options.images {
-        HowMany::All => known.images.len(),
-        HowMany::Evenly(count) => count,
+        Some(HowMany::Evenly(count)) => count,
+        Some(HowMany::All) | None => known.images.len(),
     };
     let own = known
         .trained_on

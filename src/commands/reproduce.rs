@@ -318,7 +318,7 @@ impl Job<'_> {
         let options = eval::EvalOptions {
             archives: sources.iter().map(|source| source.path.clone()).collect(),
             robots: Selection::Drawn { robots: ids, about },
-            images: HowMany::Evenly(self.plan.images),
+            images: Some(HowMany::Evenly(self.plan.images)),
             split: HeldOut::Test,
             validation: None,
             seed: 1,

@@ -12,7 +12,7 @@ use crate::baseline::nearest::nearest;
 use crate::commands::eval::images::chosen_by;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
-use crate::images::held_out::{USUAL, images_besides, test_images, usual};
+use crate::images::held_out::{images_besides, test_images, usual};
 use crate::images::whereabouts::{
     Whereabouts, load_dataset_of, part_of_others, stimuli_of, stimulus_of,
 };
@@ -114,11 +114,9 @@ pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutco
     let splits = splits.collect::<Result<Vec<grouping::ClassSplit>, Error>>()?;
     let (robots, splits) = within(&classes, robots, splits, session);
     covered(&splits, &classes, dataset.class_names())?;
-    let how_many = match (options.images, options.split) {
-        (Some(asked), _) => asked,
-        (None, HeldOut::Test) => usual(&classes, &dataset),
-        (None, HeldOut::Validation) => HowMany::Evenly(USUAL),
-    };
+    let how_many = options
+        .images
+        .unwrap_or_else(|| usual(options.split, &classes, &dataset));
     let images = match options.split {
         HeldOut::Test => test_images(&classes, &dataset, how_many, options.seed)?,
         HeldOut::Validation => validation_images(how_many, &sources, &classes, &dataset)?,

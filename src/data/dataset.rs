@@ -116,6 +116,9 @@ enum Images {
     Gates(Gates),
 }
 
+/// Where images come from that have no files.
+const DRAWN: &str = "drawn by the program";
+
 /// Returns true if the program draws the images of a dataset of this name itself.
 pub(crate) fn is_drawn(name: &str) -> bool {
     name == BUILTIN || Gates::named(name).is_some()
@@ -196,7 +199,7 @@ impl Dataset {
         Ok(Dataset {
             name: BUILTIN.to_string(),
             folder: None,
-            origin: BUILTIN.to_string(),
+            origin: DRAWN.to_string(),
             class_names: ClassNames::default(),
             splits,
         })
@@ -211,7 +214,7 @@ impl Dataset {
         Dataset {
             name: name.to_string(),
             folder: None,
-            origin: name.to_string(),
+            origin: DRAWN.to_string(),
             class_names: ClassNames::of(&gates.class_names()),
             splits: wanted.iter().map(loaded).collect(),
         }

@@ -22,6 +22,9 @@ pub enum PictureError {
         /// The requested height, or the height that follows from the width, pixels.
         height: u32,
     },
+    /// Images of one rollout cannot be shown side by side.
+    #[error("images can be side by side only if each has a fresh rollout")]
+    OneRollout,
     /// A figure would have no pixels or too many.
     #[error(
         "a figure of {width} × {height} pixels is not possible; expected 1 … 16000 on each side"

@@ -57,9 +57,7 @@ impl<'a> Film<'a> {
     ) -> Result<Self, PictureError> {
         let phases = walk.recording().phases.len();
         if side_by_side && !(0..phases).all(|phase| walk.is_fresh(phase)) {
-            return Err(PictureError::Recording(
-                "expected a fresh rollout for every image, to show them side by side",
-            ));
+            return Err(PictureError::OneRollout);
         }
         Ok(Film {
             walk,
@@ -150,5 +148,37 @@ impl<'a> Film<'a> {
             );
         }
         Ok(all)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::simulated;
+
+    #[test]
+    fn rollouts_side_by_side_share_a_clock_and_none_goes_on_from_another() {
+        let fresh = simulated("33/44", 3, 10, true);
+        let walk = Walk::new(&fresh).unwrap();
+        let film = Film::new(&walk, 320, Look::Plain, true).unwrap();
+        let moments = film.moments(4);
+        let frames: Vec<&[usize]> = moments.iter().map(|moment| &*moment.frames).collect();
+        assert_eq!(
+            frames,
+            [[0, 11, 22], [4, 15, 26], [8, 19, 30], [10, 21, 32]]
+        );
+        let last: Vec<bool> = moments.iter().map(|moment| moment.is_last).collect();
+        assert_eq!(last, [false, false, false, true]);
+        let picture = film.picture(&moments[1]).unwrap();
+        let one = Film::new(&walk, 320, Look::Plain, false).unwrap();
+        let second = one.picture(&one.moments(4)[5]).unwrap();
+        let [width, height] = one.size();
+        assert_eq!([picture.width(), picture.height()], film.size());
+        assert_eq!(film.size(), [2 * width + GAP, 2 * height + GAP]);
+        let at = |x, y| picture.pixel(width + GAP + x, y) == second.pixel(x, y);
+        assert!((0..width).all(|x| (0..height).all(|y| at(x, y))));
+        let continued = simulated("33/44", 2, 10, false);
+        let walk = Walk::new(&continued).unwrap();
+        assert!(Film::new(&walk, 320, Look::Plain, true).is_err());
     }
 }

@@ -8,7 +8,7 @@ use crate::config::Config;
 use crate::config::validation::{IMAGES_KEY, LEAST, ValidationConfig};
 use crate::data::dataset::{Dataset, Split};
 use crate::images::training::TrainingImages;
-use crate::store::images::{HowMany, ImageRef};
+use crate::store::images::{HeldOut, HowMany, ImageRef};
 use crate::store::run::RunFile;
 use crate::store::training::Origin;
 use crate::task::class_names::ClassNames;
@@ -188,10 +188,13 @@ pub(crate) fn images_besides(
 }
 
 /// Number of images of a test if nobody says another.
-pub(crate) const USUAL: usize = 1000;
+const USUAL: usize = 1000;
 
-/// Returns how many test images are shown if nobody says: 1000, or all if there are fewer.
-pub(crate) fn usual(classes: &[u8], dataset: &Dataset) -> HowMany {
+/// Returns how many images are shown if nobody says: 1000, or all test images if there are fewer.
+pub(crate) fn usual(split: HeldOut, classes: &[u8], dataset: &Dataset) -> HowMany {
+    if split == HeldOut::Validation {
+        return HowMany::Evenly(USUAL);
+    }
     let of_class = |class: &u8| dataset.indices_of(Split::Test, *class).len();
     let fewest = classes.iter().map(of_class).min().unwrap_or(0);
     match fewest >= USUAL.div_ceil(classes.len().max(1)) {

@@ -25,7 +25,7 @@ pub(crate) const ALL: &str = "gallery";
 
 pub(crate) const TEXT: &str = include_str!("../../data/gallery.json");
 
-/// Reads the runs of a shipped set, [`gallery::ZERO_ONE`] or [`gallery::TEAM`], with their audits.
+/// Reads the runs of a shipped set that is audited, such as [`gallery::ZERO_ONE`], and the audits.
 ///
 /// # Errors
 /// Returns an error if there is no such set, or if it is damaged (which a test excludes).

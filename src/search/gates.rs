@@ -293,7 +293,7 @@ mod tests {
         let none = Vec::new;
         let and = of(|a, b| a + b - 1.55);
         assert_eq!(and, [none(), vec![55.0], none(), vec![55.0]]);
-        let twice = of(|a, _| (a - 0.25) * (0.75 - a));
+        let twice = of(|a, _| 0.25 - (a - 0.5).abs());
         assert_eq!(twice, [vec![25.0, 75.0], vec![25.0, 75.0], none(), none()]);
     }
 }

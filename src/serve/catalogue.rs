@@ -3,7 +3,9 @@
 use crate::base::error::Error;
 use crate::body::{Body, VoxelCounts};
 use crate::config::Config;
+use crate::data::gates::Gates;
 use crate::robots::published;
+use crate::search::held_out_run::task_of;
 use crate::serve::course::Course;
 use crate::serve::refusal::HttpRefusal;
 use crate::shipped::gallery;
@@ -15,6 +17,7 @@ use crate::store::names::RUN_JSON;
 use crate::store::run::{Robot, RunFile};
 use crate::task::answer::Readout;
 use crate::task::class_names::ClassNames;
+use crate::task::gates::gate;
 use crate::task::protocol::Protocol;
 use crate::task::stimulus::StimulusParams;
 use serde::Serialize;
@@ -49,6 +52,9 @@ pub(crate) struct Entry {
     pub(crate) id: String,
     /// The task, such as "0|123".
     pub(crate) task: String,
+    /// The name of the logic gate that the task is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) gate: Option<String>,
     /// The fitness on the training images, as measured by its run.
     pub(crate) fitness: f64,
     pub(crate) voxels: VoxelCounts,
@@ -172,7 +178,8 @@ impl RobotCatalogue {
         let mut notes = Vec::new();
         let zero_one = trained(gallery::ZERO_ONE, "Trained on thousands of images")?;
         let team = trained(gallery::TEAM, "Ten digits: a robot for each pair")?;
-        let built_in = [zero_one, published()?, team].map(Arc::new).to_vec();
+        let gates = trained(gallery::GATES, "Logic gates")?;
+        let built_in = [zero_one, published()?, team, gates].map(Arc::new).to_vec();
         let mut watch = Watch {
             watched: Vec::new(),
             paths: HashSet::new(),
@@ -470,9 +477,13 @@ fn of_run(run: RunFile, audit: Option<&AuditFile>) -> Result<Collection, Error> 
             conclusion: found.conclusion(),
         })
     };
+    let cues = Gates::named(&run.config.data.dataset).map(|gates| gates.cues);
+    let grouping = run.config.grouping().ok();
+    let gate_of = |robot: &Robot| Some(gate(task_of(grouping.as_ref()?, robot)?, cues?).name);
     let entry = |robot: &Robot| Entry {
         id: robot.id.clone(),
         task: robot.task.clone(),
+        gate: gate_of(robot),
         fitness: robot.objective,
         voxels: robot.voxels,
         cell: robot.cell.clone(),

@@ -92,6 +92,8 @@ impl ImageSets {
             }
         }
         sets.push(Dataset::load(BUILTIN, &[], &[Split::Test]).map_err(refuse)?);
+        // The page begins with the first set: digits, if cues are not all that there is.
+        sets.sort_by_key(|set| Gates::named(set.name()).is_some());
         Ok((
             ImageSets { sets },
             notes.into_iter().map(|(_, note)| note).collect(),

@@ -17,7 +17,10 @@ pub const TEAM: &str = "gallery:team";
 /// Gaits to train, those of `demo` first; they have no task, so they are not in `gallery:all`.
 pub(crate) const GAITS: &str = "gallery:gaits";
 
-/// All runs that have a task.
+/// A run whose robots compute logic gates of two cues.
+pub const GATES: &str = "gallery:gates";
+
+/// All runs whose robots read digits.
 const ALL: &str = "gallery:all";
 
 /// A run: its name, and its files with their names.
@@ -26,26 +29,19 @@ type Run = (&'static str, &'static [(&'static str, &'static str)]);
 /// Runs that belong together: the name of the set, and at least one run.
 type Set = (&'static str, &'static [Run]);
 
+macro_rules! files {
+    ($name:expr, $folder:expr, $($file:literal)*) => {
+        (
+            $name,
+            &[$(($file, include_str!(concat!("../../data/", $folder, "/", $file)))),*],
+        )
+    };
+}
+
 #[cfg(feature = "gallery")]
 macro_rules! run {
     ($name:expr, $folder:expr) => {
-        (
-            $name,
-            &[
-                (
-                    "run.json",
-                    include_str!(concat!("../../data/", $folder, "/run.json")),
-                ),
-                (
-                    "audit.json",
-                    include_str!(concat!("../../data/", $folder, "/audit.json")),
-                ),
-                (
-                    "validation.json",
-                    include_str!(concat!("../../data/", $folder, "/validation.json")),
-                ),
-            ],
-        )
+        files!($name, $folder, "run.json" "audit.json" "validation.json")
     };
 }
 
@@ -54,25 +50,6 @@ macro_rules! run {
 macro_rules! tasks {
     ($folder:literal: $($task:literal)*) => {
         &[$(run!(concat!("gallery:", $folder, "-", $task), concat!($folder, "/", $task))),*]
-    };
-}
-
-#[cfg(feature = "gallery")]
-macro_rules! gaits {
-    ($name:literal, $folder:literal) => {
-        (
-            $name,
-            &[
-                (
-                    "run.json",
-                    include_str!(concat!("../../data/", $folder, "/run.json")),
-                ),
-                (
-                    "response.json",
-                    include_str!(concat!("../../data/", $folder, "/response.json")),
-                ),
-            ],
-        )
     };
 }
 
@@ -106,10 +83,11 @@ const SETS: &[Set] = &[
     (
         GAITS,
         &[
-            gaits!("gallery:gaits-6", "gaits/seed-6"),
-            gaits!("gallery:gaits-1", "gaits/seed-1"),
+            files!("gallery:gaits-6", "gaits/seed-6", "run.json" "response.json"),
+            files!("gallery:gaits-1", "gaits/seed-1", "run.json" "response.json"),
         ],
     ),
+    (GATES, &[files!(GATES, "gates", "run.json" "audit.json")]),
 ];
 
 pub(crate) fn text(name: &str, file: &str) -> Option<&'static str> {
@@ -139,7 +117,7 @@ fn runs_of(sets: &[Set], name: &str) -> Result<Vec<PathBuf>, String> {
         ));
     }
     let of_set = |(set, runs): &Set| {
-        let is_whole = *set == name || name == ALL && *set != GAITS;
+        let is_whole = *set == name || name == ALL && ![GAITS, GATES].contains(set);
         runs.iter()
             .map(|(run, _)| *run)
             .filter(|run| is_whole || *run == name)
@@ -153,10 +131,9 @@ fn runs_of(sets: &[Set], name: &str) -> Result<Vec<PathBuf>, String> {
     match found.is_empty() {
         true => {
             // Each set is listed with one of its runs as an example.
-            let names: Vec<String> = sets
-                .iter()
-                .map(|(set, runs)| format!("{set}, {}", runs[0].0))
-                .collect();
+            let examples = sets.iter().flat_map(|(set, runs)| [*set, runs[0].0]);
+            let mut names: Vec<&str> = examples.collect();
+            names.dedup();
             Err(format!(
                 "there is no {name}: expected {ALL}, {}",
                 names.join(", ")

@@ -14,11 +14,22 @@ const OF_TWO: [(&str, &[u8]); 7] = [
     ("b and not a", &[1]),
 ];
 
-/// Gates of three cues that have names of their own.
-const OF_THREE: [(&str, &[u8]); 4] = [
-    ("OR", &[1, 2, 3, 4, 5, 6, 7]),
-    ("AND", &[7]),
+/// One gate of each of the 13 classes of gates of three cues `a`, `b` and `c`: the others of a
+/// class come from it by exchanging and negating cues and by negating the answer (NPN classes;
+/// the fourteenth has the two constants).
+const OF_THREE: [(&str, &[u8]); 13] = [
+    ("a", &[4, 5, 6, 7]),
+    ("a and b", &[6, 7]),
+    ("a xor b", &[2, 3, 4, 5]),
+    ("a and b and c", &[7]),
+    ("a and (b or c)", &[5, 6, 7]),
+    ("a and (b xor c)", &[5, 6]),
+    ("a xor (b and c)", &[3, 4, 5, 6]),
+    ("if a then b else c", &[1, 3, 6, 7]),
     ("majority", &[3, 5, 6, 7]),
+    ("exactly one", &[1, 2, 4]),
+    ("all or none", &[0, 7]),
+    ("a and b, or c alone", &[1, 6, 7]),
     ("parity", &[1, 2, 4, 7]),
 ];
 
@@ -43,18 +54,54 @@ pub(crate) fn gate(split: &ClassSplit, cues: usize) -> Gate {
     let [a, b] = [Group::A, Group::B].map(|group| split.classes(group));
     let mut bright = if a.contains(&0) { b } else { a }.to_vec();
     bright.sort_unstable();
-    let known: &[(&str, &[u8])] = match cues {
-        2 => &OF_TWO,
-        3 => &OF_THREE,
-        _ => &[],
-    };
-    let name = known.iter().find(|(_, classes)| *classes == bright);
+    let known = OF_TWO.iter().filter(|_| cues == 2);
+    let name = known.into_iter().find(|(_, inputs)| *inputs == bright);
     let bit = |input: u8| if bright.contains(&input) { '1' } else { '0' };
     let table = || (0..1 << cues).rev().map(bit).collect();
     Gate {
         name: name.map_or_else(table, |(name, _)| (*name).to_string()),
         bright,
     }
+}
+
+/// Returns the name of the class of a gate of three cues.
+pub(crate) fn class_of_three(gate: &Gate) -> &'static str {
+    let table = |bright: &[u8]| bright.iter().fold(0_u8, |table, input| table | 1 << input);
+    let wanted = least(table(&gate.bright));
+    let (name, _) = OF_THREE
+        .into_iter()
+        .find(|(_, bright)| least(table(bright)) == wanted)
+        .expect("a gate is not constant, and all other classes of three cues are listed");
+    name
+}
+
+/// Returns the least of all truth tables of three cues that have the same class; bit `i` is the
+/// answer to input `i`.
+fn least(table: u8) -> u8 {
+    const ORDERS: [[u8; 3]; 6] = [
+        [0, 1, 2],
+        [0, 2, 1],
+        [1, 0, 2],
+        [1, 2, 0],
+        [2, 0, 1],
+        [2, 1, 0],
+    ];
+    let other = |order: [u8; 3], negated: u8| {
+        let from = |input: u8| {
+            let moved = (0..3).map(|cue| (input >> order[cue] & 1) << cue);
+            moved.sum::<u8>() ^ negated
+        };
+        (0..8).fold(0, |other, input| {
+            other | (table >> from(input) & 1) << input
+        })
+    };
+    let all = ORDERS
+        .into_iter()
+        .flat_map(|order| (0..8).map(move |negated| (order, negated)));
+    all.map(|(order, negated)| other(order, negated))
+        .map(|table: u8| table.min(!table))
+        .min()
+        .expect("there are orders")
 }
 
 #[cfg(test)]
@@ -75,13 +122,26 @@ mod tests {
     }
 
     #[test]
-    fn gates_of_three_cues_have_a_name_or_a_truth_table() {
-        let of = |bright: &[u8]| {
-            let dark: Vec<u8> = (0..8).filter(|class| !bright.contains(class)).collect();
-            gate(&Grouping::two_groups(&dark, bright).unwrap().tasks()[0], 3).name
-        };
-        assert_eq!(of(&[3, 5, 6, 7]), "majority");
-        assert_eq!(of(&[7, 4, 2, 1]), "parity");
-        assert_eq!(of(&[1, 7]), "10000010");
+    fn all_gates_of_three_cues_have_one_of_thirteen_classes() {
+        let inputs: Vec<u8> = (0..8).collect();
+        let splits = Grouping::all_splits(&inputs, false).unwrap();
+        let mut classes = std::collections::BTreeMap::<&str, usize>::new();
+        for split in splits.tasks() {
+            *classes.entry(class_of_three(&gate(split, 3))).or_default() += 1;
+        }
+        // Each split stands for two truth tables; the published sizes of the classes.
+        let sizes: Vec<usize> = OF_THREE.iter().map(|(name, _)| 2 * classes[name]).collect();
+        assert_eq!(sizes, [6, 24, 6, 16, 48, 24, 24, 24, 8, 16, 8, 48, 2]);
+        for (name, bright) in OF_THREE {
+            let dark: Vec<u8> = (0..8).filter(|input| !bright.contains(input)).collect();
+            let split = &Grouping::two_groups(&dark, bright).unwrap();
+            assert_eq!(class_of_three(&gate(&split.tasks()[0], 3)), name);
+        }
+    }
+
+    #[test]
+    fn gates_of_more_cues_are_called_by_their_truth_tables() {
+        let split = Grouping::two_groups(&[0, 2, 3, 4, 5, 6], &[1, 7]).unwrap();
+        assert_eq!(gate(&split.tasks()[0], 3).name, "10000010");
     }
 }

@@ -131,7 +131,7 @@ fn where_a_few_words_are_meant_shells_offer_them() {
         assert!(bash.contains(words), "bash: {words}");
     };
     offered(
-        "body spacetime snapshots archive progress accuracy capacity",
+        "body spacetime snapshots archive progress accuracy capacity gates",
         1,
     );
     // Of eval and of team; bash has it for options.
@@ -140,7 +140,7 @@ fn where_a_few_words_are_meant_shells_offer_them() {
     offered("gif html png terminal", 2);
     offered("plain paper", 1);
     offered("mnist fashion-mnist", 1);
-    offered("builtin mnist fashion-mnist", 2);
+    offered("builtin gates gates-3 gates-4 mnist fashion-mnist", 2);
     offered(
         &morphcog::commands::schema::ALL
             .map(|schema| schema.name)

@@ -10,6 +10,7 @@ mod data;
 mod eval;
 mod full_disk;
 mod gaits;
+mod gates;
 mod help;
 mod no_threads;
 mod output;

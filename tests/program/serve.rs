@@ -122,12 +122,12 @@ fn the_page_its_headers_and_what_there_is() {
         .collect();
     assert_eq!(
         (numbers.len(), numbers[1], numbers[2]),
-        (4, &json!(5), &json!(45))
+        (5, &json!(5), &json!(45))
     );
     let trained = json_of(&server.get("/api/archives/0"));
     assert_eq!(trained["robots"][0]["audit"]["verdict"], "physical");
     let run = sandbox.run_file("runs/one");
-    let listed = json_of(&server.get("/api/archives/3"));
+    let listed = json_of(&server.get("/api/archives/4"));
     assert_eq!(listed["robots"].as_array().unwrap().len(), run.elites.len());
     let best = &listed["robots"][0];
     let robot = run
@@ -169,7 +169,7 @@ fn an_audit_beside_the_archive_is_shown() {
         .run("audit --archive runs/one/run.json --robots top:1 --quiet")
         .ended(0, &[]);
     let server = Server::start(&sandbox, "--archive runs/one/run.json");
-    let robots = json_of(&server.get("/api/archives/3"))["robots"].clone();
+    let robots = json_of(&server.get("/api/archives/4"))["robots"].clone();
     assert!(robots[0]["audit"]["verdict"].is_string(), "{}", robots[0]);
     assert_eq!(robots[1]["audit"], Value::Null);
 }
@@ -232,7 +232,7 @@ fn a_newest_run_that_cannot_be_read_is_a_note_unless_it_was_named() {
             .as_array()
             .unwrap()
             .len(),
-        3
+        4
     );
     sandbox
         .run("serve --no-open --archive runs/broken")
@@ -604,7 +604,7 @@ fn a_pipe_in_the_place_of_a_file_of_a_run_blocks_nobody() {
             .unwrap()
             .len()
     };
-    assert_eq!(names(), 4);
+    assert_eq!(names(), 5);
     pipe(&sandbox, "runs/later/run.json");
     for name in ["metrics.csv", "audit.json", ".lock"] {
         pipe(&sandbox, &format!("runs/two/{name}"));
@@ -615,9 +615,9 @@ fn a_pipe_in_the_place_of_a_file_of_a_run_blocks_nobody() {
     )
     .unwrap();
     std::thread::sleep(Duration::from_millis(600));
-    assert_eq!(names(), 5);
+    assert_eq!(names(), 6);
     refused(
-        &server.get("/api/archives/4/progress"),
+        &server.get("/api/archives/5/progress"),
         404,
         "runs/two/metrics.csv: ",
     );
@@ -919,7 +919,7 @@ fn robots_of_several_tasks_walk_together_as_a_team_and_are_counted() {
         (tasks, &team["classes"]),
         (vec!["0|1", "2|3"], &json!([0, 1, 2, 3]))
     );
-    assert_eq!(members[0]["archive"], 3);
+    assert_eq!(members[0]["archive"], 4);
     let request = json!({ "shown": { "drawing": drawing() }, "speed": 0 });
     let events: Vec<(String, Value)> = server.events("/api/team", &request).collect();
     let names: Vec<&str> = events.iter().map(|(name, _)| name.as_str()).collect();

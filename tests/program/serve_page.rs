@@ -356,7 +356,7 @@ fn a_run_that_begins_while_the_page_is_open_appears_grows_and_ends_on_it() {
     let mut child = sandbox.endless("runs/live");
     let text = "document.getElementById('archive').textContent";
     tab.wait(&format!("{text}.includes('of 10000000')"));
-    choose(&mut tab, "3");
+    choose(&mut tab, "4");
     tab.wait("!document.getElementById('progress').hidden");
     tab.wait("document.querySelectorAll('#curves svg').length === 3");
     tab.wait("document.getElementById('course').textContent.includes('left')");
@@ -408,7 +408,7 @@ fn below_the_prefix_of_a_proxy_and_by_a_name_that_is_allowed_all_of_the_page_wor
     tab.click("#tab-test");
     tab.click("#thumbs button");
     at_end(&mut tab);
-    choose(&mut tab, "3");
+    choose(&mut tab, "4");
     tab.wait("document.querySelectorAll('#curves svg').length === 3");
     tab.click("#tab-team");
     tab.wait("document.querySelectorAll('#stages figure').length === 2");
@@ -453,7 +453,7 @@ fn an_audit_that_appears_while_the_page_is_open_is_said_and_can_be_chosen_by() {
     let server = Server::start(&sandbox, "--archive run");
     let mut tab = browser.tab(1280, 900, false);
     open(&mut tab, &server);
-    choose(&mut tab, "3");
+    choose(&mut tab, "4");
     let begun =
         || serde_json::from_str::<Value>(&server.get("/api/status").body).unwrap()["begun"].clone();
     let (who, before) = (tab.text("#who"), begun());
@@ -615,4 +615,52 @@ fn a_team_walks_on_small_stages_and_its_votes_are_counted() {
         assert_eq!(tab.complaints(), Vec::<String>::new());
         tab.close();
     }
+}
+
+#[test]
+fn cues_are_switched_while_the_body_walks_and_digits_come_back_with_their_robots() {
+    let sandbox = Sandbox::new();
+    let Some(mut browser) = browser(&sandbox) else {
+        return;
+    };
+    let server = Server::start(&sandbox, "");
+    let mut tab = browser.tab(1280, 900, false);
+    open(&mut tab, &server);
+    choose(&mut tab, "3");
+    tab.wait("!document.getElementById('cues').hidden");
+    let cues = |tab: &mut Tab| {
+        [
+            tab.text("#cues :nth-child(1)"),
+            tab.text("#cues :nth-child(2)"),
+        ]
+    };
+    assert_eq!(cues(&mut tab), ["Cue a: dark", "Cue b: dark"]);
+    let step = |tab: &mut Tab| tab.eval("Number(document.getElementById('time').value)");
+    tab.wait("Number(document.getElementById('time').value) > 20");
+    let before = step(&mut tab).as_f64().unwrap();
+    for (button, now, picture) in [
+        (
+            2,
+            ["Cue a: dark", "Cue b: bright"],
+            "01 (gates test image 1)",
+        ),
+        (
+            1,
+            ["Cue a: bright", "Cue b: bright"],
+            "11 (gates test image 3)",
+        ),
+    ] {
+        tab.click(&format!("#cues :nth-child({button})"));
+        tab.wait(&format!(
+            "document.getElementById('picture').textContent === '{picture}'"
+        ));
+        assert_eq!(cues(&mut tab), now);
+    }
+    // The same walk went on.
+    assert!(step(&mut tab).as_f64().unwrap() >= before);
+    keep_picture("serve-gates.png", &tab.screenshot());
+    choose(&mut tab, "0");
+    tab.wait("document.getElementById('cues').hidden");
+    assert_eq!(tab.text("#set option:checked"), "built-in digits");
+    assert_eq!(tab.complaints(), Vec::<String>::new());
 }

@@ -314,7 +314,7 @@ fn run(world: &World, dice: &mut Dice, case: &mut Case) {
     let options = eval::EvalOptions {
         archives: vec![archive.clone()],
         robots: Selection::Top(1),
-        images: HowMany::Evenly(2),
+        images: Some(HowMany::Evenly(2)),
         split: HeldOut::Test,
         validation: None,
         seed: 1,

@@ -163,6 +163,7 @@ pub(crate) fn make(
 ) -> Result<Vec<PathBuf>, Error> {
     let failed = |error: PictureError| match error {
         PictureError::Size { .. } => Error::usage(error.to_string()).about("width"),
+        PictureError::OneRollout => Error::usage(error.to_string()).about("side_by_side"),
         error => error.into(),
     };
     let mut made = Vec::new();

@@ -29,6 +29,8 @@ use crate::store::names::RUN_JSON;
 use crate::store::run::RunFile;
 use crate::store::validation::Validated;
 use crate::task::class_names::ClassNames;
+use crate::task::gates::class_of_three;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// The number of robots listed after an evolution.
@@ -51,6 +53,9 @@ pub(crate) fn evolution(console: &Console, finished: &EvolveOutcome, out: &Path,
     }
     match search::gates::found(run, |_| true) {
         found if found.is_empty() => fittest(console, run),
+        found if Gates::named(&run.config.data.dataset) == Some(Gates { cues: 3 }) => {
+            classes_of_gates(console, &found);
+        }
         found => gates(console, run, &found),
     }
     let stats = run.stats;
@@ -104,11 +109,14 @@ pub(crate) fn evolution(console: &Console, finished: &EvolveOutcome, out: &Path,
         &format!("morphcog replay --robot best --archive {archive}"),
     );
     // Test images of gates are those that they were evolved on.
-    let then = match Gates::named(&run.config.data.dataset) {
-        Some(_) => "audit",
-        None => "eval",
+    let then: &[&str] = match Gates::named(&run.config.data.dataset) {
+        Some(Gates { cues: 2 }) => &["audit", "plot gates"],
+        Some(_) => &["audit"],
+        None => &["eval"],
     };
-    console.suggest("     ", &format!("morphcog {then} --archive {archive}"));
+    for command in then {
+        console.suggest("     ", &format!("morphcog {command} --archive {archive}"));
+    }
 }
 
 /// Writes what gates do under what cues and starts can do.
@@ -177,6 +185,41 @@ fn fittest(console: &Console, run: &RunFile) {
         "voxels",
     ];
     console.table(&headers, &rows.collect::<Vec<_>>());
+}
+
+/// Writes how many gates of each class of three cues a run found, and the fittest of each.
+fn classes_of_gates(console: &Console, found: &[FoundGate]) {
+    let mut classes: BTreeMap<&str, Vec<&FoundGate>> = BTreeMap::new();
+    for found in found {
+        classes
+            .entry(class_of_three(&found.gate))
+            .or_default()
+            .push(found);
+    }
+    let row = |(class, found): (&str, Vec<&FoundGate>)| {
+        let best = found
+            .iter()
+            .max_by(|a, b| a.robot.objective.total_cmp(&b.robot.objective))
+            .expect("a class has a gate");
+        let right = found.iter().filter(|found| found.robot.objective > 0.0);
+        vec![
+            class.to_string(),
+            right.count().to_string(),
+            number::fixed(best.robot.objective, 2),
+            best.gate.name.clone(),
+            best.side.name().to_string(),
+            best.robot.id.clone(),
+        ]
+    };
+    let headers = [
+        "class of gates",
+        "right",
+        "fitness",
+        "table",
+        "true",
+        "robot",
+    ];
+    console.table(&headers, &classes.into_iter().map(row).collect::<Vec<_>>());
 }
 
 /// Writes which logic gates a run found.

@@ -6,7 +6,7 @@ use crate::base::error::Error;
 use crate::config::Config;
 use crate::data::dataset::{Dataset, Split};
 use crate::images::held_out;
-use crate::images::held_out::images_besides;
+use crate::images::held_out::{images_besides, usual};
 use crate::images::training::TrainingImages;
 use crate::images::whereabouts::{stimuli_of, stimulus_of};
 use crate::store::eval::Baselines;
@@ -23,7 +23,8 @@ const PIXEL_IMAGES_PER_CLASS: usize = 500;
 
 #[derive(Clone, Copy)]
 pub(crate) struct Draw {
-    pub(crate) images: HowMany,
+    /// `None`: [`usual`].
+    pub(crate) images: Option<HowMany>,
     pub(crate) split: HeldOut,
     pub(crate) seed: u64,
     /// Number of validation images by which robots are chosen at the same time, if they are.
@@ -49,12 +50,15 @@ impl<'a> HeldOutImages<'a> {
         dataset: &'a Dataset,
         draw: Draw,
     ) -> Result<Self, Error> {
-        let (asked, least) = (draw.images, config.classes().len());
+        let classes = config.classes();
+        let asked = draw
+            .images
+            .unwrap_or_else(|| usual(draw.split, &classes, dataset));
+        let least = classes.len();
         if !asked.has_each(least) {
             let text = format!("expected {least} or more, one of each class");
             return Err(Error::argument("images", asked, text));
         }
-        let classes = config.classes();
         let images = match draw.split {
             HeldOut::Test => held_out::test_images(&classes, dataset, asked, draw.seed)?,
             HeldOut::Validation => {

@@ -94,7 +94,7 @@ pub(crate) fn test_of(
     Ok(Some(eval::EvalOptions {
         archives: vec![folder.join(RUN_JSON)],
         robots: selection("eval.robots", &step.robots)?.physical(step.physical_only),
-        images: step.images,
+        images: Some(step.images),
         split: step.split,
         validation: None,
         seed: 1,

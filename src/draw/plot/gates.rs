@@ -57,7 +57,7 @@ pub(crate) fn gates(all: &[GateWalks], of: &str) -> Figure {
         let lines = names.map(|material| (material, robot::plain(material), material.name()));
         robot::legend(&mut canvas, at, lines, panel);
     }
-    let name = "walk [voxel lengths], right positive; a dot where the gate should be true";
+    let name = "walk [voxel lengths], right positive, strongest from ±10; a dot where the gate should be true";
     let axis = Axis::exact(-STRONG, STRONG, 4);
     let shade = |walk: f64| scales::diverging(walk / STRONG);
     let bar = [MARGIN + 6.0, below];

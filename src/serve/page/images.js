@@ -20,7 +20,9 @@ export class Images {
     await this.open(this.sets[0].name);
   }
 
-  // The set a robot was evolved on, and of it the classes of its task first.
+  // True if there is such a set, and another one is open.
+  has(name) { return name !== this.set.name && this.sets.some((set) => set.name === name); }
+
   async open(name) {
     this.set = this.sets.find((set) => set.name === name) ?? this.set;
     $("set").value = this.set.name;
@@ -41,6 +43,7 @@ export class Images {
     const cues = this.set.cues ?? 0;
     if (cues || !$("cues").hidden) $("manner").value = cues ? "on" : "fresh";
     $("cues").hidden = !cues;
+    if (cues) $("tab-test").click();
     for (const id of ["classes", "thumbs", "newer", "older", "lucky"]) $(id).hidden = !!cues;
     $("cues").replaceChildren(...Array.from({ length: cues }, (_, cue) => {
       const button = element("button", { type: "button" }), bit = 1 << (cues - 1 - cue);

@@ -113,7 +113,7 @@ const introduce = (robot, from) => {
   $("encoding").textContent = `${part}${robot.body.length} × ${robot.body[0].length} pixels, ${way}`;
   $("who").textContent = robot.id;
   const audit = robot.audit ? ` · audit: ${robot.audit.conclusion}` : "";
-  $("about").textContent = `${from.name} · task ${robot.task} · fitness ${signed(robot.fitness, 2)} · ${robot.voxels.total} voxels${audit}`;
+  $("about").textContent = `${from.name} · ${robot.gate ? `gate ${robot.gate}` : `task ${robot.task}`} · fitness ${signed(robot.fitness, 2)} · ${robot.voxels.total} voxels${audit}`;
 };
 
 const choose = (robot, from) => {
@@ -131,7 +131,20 @@ const choose = (robot, from) => {
 // It walks on, whatever has been found of it meanwhile.
 const renew = (robot, from) => { if (who?.robot?.id === robot.id && who.from.index === from.index) introduce(robot, from); };
 
-const robots = new Robots(materials, choose, renew);
+// An archive's robots see images of its dataset; cues are no digits, and digits no cues.
+const opened = async (dataset) => {
+  const before = images.set.cues, own = images.has(dataset);
+  if (!own && (!before || images.set.name === dataset)) return;
+  await images.open(own ? dataset : "builtin");
+  if (before || images.set.cues) pictured();
+};
+
+const pictured = () => {
+  const first = images.shown[0];
+  if (first) picture = { shown: { image: { set: images.set.name, index: first.index } }, about: images.about(first) };
+};
+
+const robots = new Robots(materials, opened, choose, renew);
 
 const editor = new Editor(materials, {
   say,
@@ -289,8 +302,7 @@ requestAnimationFrame(tick);
 try {
   await images.load();
   // Something to see at once: a test image, unless motion is not wanted.
-  const first = images.shown[0];
-  if (first) picture = { shown: { image: { set: images.set.name, index: first.index } }, about: images.about(first) };
+  pictured();
   await robots.load();
   await team.load();
   if (window.matchMedia("(prefers-reduced-motion: reduce)").matches) simulation?.play(false);

@@ -6,9 +6,9 @@ import { drawBody } from "./stage.js";
 const FEW = 24;
 
 export class Robots {
-  // `chosen` hears of a robot that is to be watched, `renewed` of what is new about it.
-  constructor(materials, chosen, renewed) {
-    Object.assign(this, { materials, chosen, renewed, robot: null, from: null, all: false });
+  // `opened` hears of the dataset of an archive, `chosen` of a robot that is to be watched, `renewed` of what is new about it.
+  constructor(materials, opened, chosen, renewed) {
+    Object.assign(this, { materials, opened, chosen, renewed, robot: null, from: null, all: false });
     $("archive").onchange = () => this.open(Number($("archive").value));
     $("task").onchange = () => this.show();
     $("audit").onchange = () => this.show();
@@ -80,6 +80,8 @@ export class Robots {
     this.choices();
     this.show();
     $("progress").hidden = true;
+    await this.opened(this.list[index].dataset);
+    if (this.index !== index) return;
     const first = this.from.robots[0];
     if (first) this.choose(first);
     await this.progress();
@@ -116,7 +118,7 @@ export class Robots {
 
   card(robot) {
     const canvas = element("canvas"), about = element("div", {}, element("b", { textContent: robot.id }));
-    about.append(element("span", { textContent: (this.from.tasks.length > 1 ? `${robot.task} · ` : "") + `fitness ${signed(robot.fitness, 2)}` }));
+    about.append(element("span", { textContent: (this.from.tasks.length > 1 ? `${robot.gate ?? robot.task} · ` : "") + `fitness ${signed(robot.fitness, 2)}` }));
     if (robot.audit) {
       const audit = element("span", { className: "audit", textContent: robot.audit.conclusion });
       audit.dataset.verdict = robot.audit.verdict;
