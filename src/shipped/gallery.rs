@@ -29,6 +29,8 @@ type Run = (&'static str, &'static [(&'static str, &'static str)]);
 /// Runs that belong together: the name of the set, and at least one run.
 type Set = (&'static str, &'static [Run]);
 
+/// Makes a run of the files of a folder of `data/`.
+#[cfg(feature = "gallery")]
 macro_rules! files {
     ($name:expr, $folder:expr, $($file:literal)*) => {
         (
