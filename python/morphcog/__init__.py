@@ -537,13 +537,13 @@ class Run:
         identity, task, objective, body = self._data.robot(robot)
         return Robot(identity, task, objective, body, self)
 
-    def evaluate(self, robots="top:10", images=1000, split="test", data=None, quiet=False):
+    def evaluate(self, robots="top:10", images=None, split="test", data=None, quiet=False):
         """Tests robots on held-out images, as `morphcog eval`: a DataFrame with a row for each robot.
 
-        images: how many, or "all". quiet: says nothing of how far it is.
+        images: how many, or "all"; None: 1000, or all if there are fewer. quiet: says nothing of how far it is.
         """
         with _Progress(quiet) as progress:
-            return _table_in(self._data.evaluate(str(robots), str(images), str(split), _path(data), progress))
+            return _table_in(self._data.evaluate(str(robots), images and str(images), str(split), _path(data), progress))
 
     def audit(self, robots="all", data=None, quiet=False):
         """Whether robots walk or exploit the simulator, as `morphcog audit`: a DataFrame with a row for each

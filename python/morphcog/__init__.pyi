@@ -47,7 +47,7 @@ class Run:
     def evaluate(
         self,
         robots: str = "top:10",
-        images: int | Literal["all"] = 1000,
+        images: int | Literal["all"] | None = None,
         split: Literal["test", "validation"] = "test",
         data: _Path | None = None,
         quiet: bool = False,

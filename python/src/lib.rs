@@ -521,7 +521,7 @@ impl RunData {
         &self,
         py: Python,
         robots: &str,
-        images: &str,
+        images: Option<&str>,
         split: &str,
         data: Option<PathBuf>,
         listener: &Bound<PyAny>,
@@ -531,7 +531,7 @@ impl RunData {
         let options = eval::EvalOptions {
             archives: vec![self.place.clone()],
             robots: parsed("robots", robots)?,
-            images: Some(parsed("images", images)?),
+            images: images.map(|images| parsed("images", images)).transpose()?,
             split,
             validation: None,
             seed: 1,

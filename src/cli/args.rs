@@ -311,7 +311,7 @@ pub(super) struct EvalArgs {
     #[command(flatten)]
     pub(super) archives: Archives,
     /// Number of images in all, equally many per class; or "all": every image of the classes
-    /// (default: 1000, or all if there are fewer).
+    /// (default: 1000, or all test images if there are fewer).
     #[arg(short = 'n', long)]
     pub(super) images: Option<HowMany>,
     /// Which images: test, or validation (of the training split, neither trained on nor chosen
@@ -379,10 +379,10 @@ pub(super) struct ReplayArgs {
     /// run.json).
     #[arg(short, long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
-    /// GIF and PNG show all images at once, not one after the other.
+    /// Show all images at once in GIF and PNG, instead of one after another (the page has a button).
     #[arg(long)]
     pub(super) side_by_side: bool,
-    /// Width of GIF and PNG in pixels; side by side, of each walk.
+    /// Width of GIF and PNG in pixels; with --side-by-side, of each walk.
     #[arg(long, default_value_t = 480, value_parser = whole::<u32>(0..=MOST))]
     pub(super) width: u32,
     /// Control steps per frame of the GIF: 1 is the robot's own time, more is faster and a smaller

@@ -29,8 +29,8 @@ Kinds:
              archives (seeds) make a band
   accuracy   what morphcog eval found
   capacity   what morphcog capacity found
-  gates      the logic gates of a run on the dataset gates:
-             its walks at every brightness of both cues
+  gates      each logic gate of a run on the dataset gates: its
+             body, and its walks at every brightness of both cues
 
 With several robots or archives, every kind but progress makes one figure for each. accuracy and \
 capacity read eval.json and capacity.json beside run.json, or the file that --archive names.

@@ -476,7 +476,7 @@ impl Config {
             return refuse(
                 "data.transpose",
                 true.to_string(),
-                "false: the built-in digits stand upright",
+                "false: images that the program draws are upright",
             );
         }
         self.data

@@ -17,7 +17,7 @@ pub(crate) struct Gates {
 }
 
 impl Gates {
-    /// Side of the images: strips of two, three and four cues are as wide as each other.
+    /// Side of the images; divisible by 2, 3 and 4, so that strips are equally wide.
     pub(crate) const SIDE: usize = 24;
 
     /// Returns the cues of the dataset of a name; `None` if that is no dataset of gates.

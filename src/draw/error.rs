@@ -23,8 +23,18 @@ pub enum PictureError {
         height: u32,
     },
     /// Images of one rollout cannot be shown side by side.
-    #[error("images can be side by side only if each has a fresh rollout")]
+    #[error("side by side needs a fresh rollout for each image (protocol.rollout = \"fresh\")")]
     OneRollout,
+    /// Pictures side by side would be too large together.
+    #[error(
+        "{width} × {height} pixels side by side are too many; expected at most 4096 on each side"
+    )]
+    Large {
+        /// The width together, pixels.
+        width: u32,
+        /// The height together, pixels.
+        height: u32,
+    },
     /// A figure would have no pixels or too many.
     #[error(
         "a figure of {width} × {height} pixels is not possible; expected 1 … 16000 on each side"

@@ -12,6 +12,9 @@ use tiny_skia::{Pixmap, PixmapPaint, Transform};
 /// Line between pictures side by side, pixels.
 const GAP: u32 = 2;
 
+/// Most pixels of a side of pictures side by side: a film keeps dozens in memory.
+const MOST: u32 = 4096;
+
 /// A picture of a film.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Moment {
@@ -59,11 +62,16 @@ impl<'a> Film<'a> {
         if side_by_side && !(0..phases).all(|phase| walk.is_fresh(phase)) {
             return Err(PictureError::OneRollout);
         }
-        Ok(Film {
+        let film = Film {
             walk,
             stage: Stage::new(walk, width)?.look(look),
             side_by_side,
-        })
+        };
+        let [width, height] = film.size();
+        match side_by_side && width.max(height) > MOST {
+            true => Err(PictureError::Large { width, height }),
+            false => Ok(film),
+        }
     }
 
     /// Gives voxels hard edges.
@@ -88,7 +96,7 @@ impl<'a> Film<'a> {
             true => self.walk.recording().phases.len() as u32,
             false => 1,
         };
-        let columns = (1..tiles).find(|n| n * n >= tiles).unwrap_or(1);
+        let columns = (1..=tiles).find(|n| n * n >= tiles).unwrap_or(1);
         [columns, tiles.div_ceil(columns)]
     }
 
@@ -177,6 +185,12 @@ mod tests {
         assert_eq!(film.size(), [2 * width + GAP, 2 * height + GAP]);
         let at = |x, y| picture.pixel(width + GAP + x, y) == second.pixel(x, y);
         assert!((0..width).all(|x| (0..height).all(|y| at(x, y))));
+        let pair = simulated("33/44", 2, 10, true);
+        let walk = Walk::new(&pair).unwrap();
+        let film = Film::new(&walk, 320, Look::Plain, true).unwrap();
+        assert_eq!(film.size()[0], 2 * 320 + GAP);
+        let wide = Film::new(&walk, 4096, Look::Plain, true).map(drop);
+        assert!(matches!(wide, Err(PictureError::Large { .. })));
         let continued = simulated("33/44", 2, 10, false);
         let walk = Walk::new(&continued).unwrap();
         assert!(Film::new(&walk, 320, Look::Plain, true).is_err());

@@ -218,8 +218,9 @@
     $("moved").textContent = (Math.abs(d) < 0.005 ? "" : d < 0 ? "← " : "→ ") + signed(d);
     $("verdict").textContent = verdict(p, d, frame === N - 1 || phaseOf(frame + 1) !== p);
     $("time").value = frame;
-    $("time").setAttribute("aria-valuetext", `${phases[p].label}, step ${step} of ${stepsIn(p)}`);
-    $("world").setAttribute("aria-label", `The robot sees ${phases[p].label}; step ${step}; moved ${signed(d)} voxel lengths`);
+    $("time").setAttribute("aria-valuetext", `${together ? "" : `${phases[p].label}, `}step ${step} of ${stepsIn(p)}`);
+    const walks = frames().map((f) => `sees ${phases[phaseOf(f)].label}, moved ${signed(moved(f))} voxel lengths`);
+    $("world").setAttribute("aria-label", `Step ${step}. The robot ${walks.join("; ")}`);
     $("stimulus").setAttribute("aria-label", `The image as the sensors see it: ${phases[p].label}`);
     [...$("phases").children].forEach((b, k) => b.setAttribute("aria-pressed", String(together ? k === phases.length : k === p)));
     for (const seen of document.querySelectorAll(".seen")) seen.hidden = together;
@@ -268,7 +269,7 @@
   if (isFresh) {
     const button = document.createElement("button");
     button.type = "button"; button.textContent = "Side by side";
-    button.onclick = () => { arrange(true); seek(firstFrame()); play(true); }; $("phases").append(button);
+    button.onclick = () => { arrange(true); seek(firstFrame()); if (!playing) play(true); }; $("phases").append(button);
   }
   const used = new Set(rollout.voxels.map(([m]) => m));
   rollout.materials.list.forEach((m, k) => {
@@ -279,7 +280,8 @@
   const drag = (e) => {
     if (e.type === "pointermove" && !e.buttons) return;
     const box = $("chart").getBoundingClientRect();
-    seek((e.clientX - box.left - gutter) / (box.width - gutter - 6) * (N - 1));
+    const f = Math.min(Math.max(Math.round((e.clientX - box.left - gutter) / (box.width - gutter - 6) * (N - 1)), 0), N - 1);
+    seek(together ? firstFrame() + f - phases[phaseOf(f)].first : f);
   };
   $("chart").addEventListener("pointerdown", drag);
   $("chart").addEventListener("pointermove", drag);

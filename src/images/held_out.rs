@@ -190,7 +190,7 @@ pub(crate) fn images_besides(
 /// Number of images of a test if nobody says another.
 const USUAL: usize = 1000;
 
-/// Returns how many images are shown if nobody says: 1000, or all test images if there are fewer.
+/// Returns the default number of images: 1000, or all test images if there are fewer.
 pub(crate) fn usual(split: HeldOut, classes: &[u8], dataset: &Dataset) -> HowMany {
     if split == HeldOut::Validation {
         return HowMany::Evenly(USUAL);

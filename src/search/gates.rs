@@ -1,5 +1,5 @@
 //! Logic gates that robots of a run compute: which of a run's robots compute them, and how those
-//! walk at every brightness of two cues, from other starts, and when a cue changes on the way.
+//! walk at every brightness of two cues, from raised starts, and when a cue changes mid-walk.
 
 use crate::base::Grid;
 use crate::base::error::Error;
@@ -35,7 +35,7 @@ const RAISED: [u32; 2] = [1, 2];
 pub(crate) struct FoundGate<'a> {
     pub(crate) gate: Gate,
     pub(crate) robot: &'a Robot,
-    /// The direction in which it walks where the gate is true.
+    /// The direction in which it walks when the gate is true.
     pub(crate) side: Direction,
     split: ClassSplit,
     assignment: Assignment,
@@ -60,7 +60,7 @@ pub(crate) fn found(run: &RunFile, is_wanted: impl Fn(&Robot) -> bool) -> Vec<Fo
             let (a, b) = (rank(a), rank(b));
             a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
         })?;
-        let gate = gate(split, gates.cues);
+        let gate = gate(split, gates.cues)?;
         let assignment = Assignment::from_training(split, run.fitness(), &run.answers(robot));
         let group = match gate.is_true_for(split.classes(Group::A)[0]) {
             true => Group::A,
@@ -78,14 +78,15 @@ pub(crate) fn found(run: &RunFile, is_wanted: impl Fn(&Robot) -> bool) -> Vec<Fo
     tasks.filter_map(of).collect()
 }
 
-/// How many of some walks went the right way.
+/// The number of walks in the correct direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct RightWalks {
-    pub(crate) right: usize,
+pub(crate) struct CorrectWalks {
+    pub(crate) correct: usize,
     pub(crate) all: usize,
 }
 
-/// What a gate of two cues does under what cues and starts can do.
+/// What a measured gate of two cues does at every brightness, from raised starts, and when a cue
+/// changes mid-walk.
 #[derive(Clone, Debug)]
 pub(crate) struct GateWalks {
     pub(crate) gate: Gate,
@@ -93,7 +94,7 @@ pub(crate) struct GateWalks {
     pub(crate) body: Body,
     /// Fitness of the robot \[voxel lengths\].
     pub(crate) fitness: f64,
-    /// The direction in which it walks where the gate is true.
+    /// The direction in which it walks when the gate is true.
     pub(crate) side: Direction,
     /// The verdict of its audit, if there is one.
     pub(crate) audit: Option<String>,
@@ -101,13 +102,13 @@ pub(crate) struct GateWalks {
     /// (column), both from dark to bright; `None` if unstable.
     pub(crate) walks: Grid<Option<f64>>,
     /// Walks of every input from raised starts.
-    pub(crate) starts: RightWalks,
+    pub(crate) starts: CorrectWalks,
     /// Walks of every input after every other, in one simulation.
-    pub(crate) changes: RightWalks,
+    pub(crate) changes: CorrectWalks,
 }
 
 impl GateWalks {
-    /// Returns the brightnesses at which the walk turns round along each edge of the square, in
+    /// Returns the brightnesses at which the walk reverses along each edge of the square, in
     /// this order: the first cue rises while the second is dark, while it is bright; the second
     /// rises while the first is dark, while it is bright. Between two levels the displacement is
     /// taken for linear.
@@ -207,9 +208,9 @@ fn of_gate(
     let is_right = |input: usize, walk: Option<f64>| {
         is_correct(&split, assignment, input as u8, walk, 0.0) == Some(true)
     };
-    let right = |walks: Vec<(usize, Option<f64>)>| RightWalks {
+    let right = |walks: Vec<(usize, Option<f64>)>| CorrectWalks {
         all: walks.len(),
-        right: walks
+        correct: walks
             .into_iter()
             .filter(|(input, walk)| is_right(*input, *walk))
             .count(),
@@ -268,11 +269,11 @@ mod tests {
     #[test]
     fn a_gate_switches_where_its_walk_turns_round() {
         let of = |walk: fn(f64, f64) -> f64| {
-            let none = RightWalks { right: 0, all: 0 };
+            let none = CorrectWalks { correct: 0, all: 0 };
             let gate = GateWalks {
                 gate: Gate {
                     name: String::new(),
-                    bright: Vec::new(),
+                    true_for: Vec::new(),
                 },
                 robot: String::new(),
                 body: "3".parse().unwrap(),

@@ -479,7 +479,7 @@ fn of_run(run: RunFile, audit: Option<&AuditFile>) -> Result<Collection, Error> 
     };
     let cues = Gates::named(&run.config.data.dataset).map(|gates| gates.cues);
     let grouping = run.config.grouping().ok();
-    let gate_of = |robot: &Robot| Some(gate(task_of(grouping.as_ref()?, robot)?, cues?).name);
+    let gate_of = |robot: &Robot| Some(gate(task_of(grouping.as_ref()?, robot)?, cues?)?.name);
     let entry = |robot: &Robot| Entry {
         id: robot.id.clone(),
         task: robot.task.clone(),

@@ -38,39 +38,42 @@ const OF_THREE: [(&str, &[u8]); 13] = [
 pub(crate) struct Gate {
     pub(crate) name: String,
     /// The inputs (classes) for which it is true, in their order.
-    pub(crate) bright: Vec<u8>,
+    pub(crate) true_for: Vec<u8>,
 }
 
 impl Gate {
     pub(crate) fn is_true_for(&self, input: u8) -> bool {
-        self.bright.contains(&input)
+        self.true_for.contains(&input)
     }
 }
 
-/// Returns the gate that a split of all inputs computes. It is true on the other side than that of
-/// all cues dark. Without a name of its own it is called by its truth table, from all cues bright
-/// down to all dark.
-pub(crate) fn gate(split: &ClassSplit, cues: usize) -> Gate {
+/// Returns the gate that a split of all inputs computes: false when all cues are dark. A gate
+/// without a name is called by its truth table, from all cues bright down to all dark. Returns
+/// `None` if the split leaves inputs out.
+pub(crate) fn gate(split: &ClassSplit, cues: usize) -> Option<Gate> {
     let [a, b] = [Group::A, Group::B].map(|group| split.classes(group));
-    let mut bright = if a.contains(&0) { b } else { a }.to_vec();
-    bright.sort_unstable();
-    let known = OF_TWO.iter().filter(|_| cues == 2);
-    let name = known.into_iter().find(|(_, inputs)| *inputs == bright);
-    let bit = |input: u8| if bright.contains(&input) { '1' } else { '0' };
-    let table = || (0..1 << cues).rev().map(bit).collect();
-    Gate {
-        name: name.map_or_else(table, |(name, _)| (*name).to_string()),
-        bright,
+    if a.len() + b.len() != 1 << cues {
+        return None;
     }
+    let mut true_for = if a.contains(&0) { b } else { a }.to_vec();
+    true_for.sort_unstable();
+    let mut known = OF_TWO.iter().filter(|_| cues == 2);
+    let name = known.find(|(_, inputs)| *inputs == true_for);
+    let bit = |input: u8| if true_for.contains(&input) { '1' } else { '0' };
+    let table = || (0..1 << cues).rev().map(bit).collect();
+    Some(Gate {
+        name: name.map_or_else(table, |(name, _)| (*name).to_string()),
+        true_for,
+    })
 }
 
 /// Returns the name of the class of a gate of three cues.
 pub(crate) fn class_of_three(gate: &Gate) -> &'static str {
-    let table = |bright: &[u8]| bright.iter().fold(0_u8, |table, input| table | 1 << input);
-    let wanted = least(table(&gate.bright));
+    let table = |inputs: &[u8]| inputs.iter().fold(0_u8, |table, input| table | 1 << input);
+    let wanted = least(table(&gate.true_for));
     let (name, _) = OF_THREE
         .into_iter()
-        .find(|(_, bright)| least(table(bright)) == wanted)
+        .find(|(_, inputs)| least(table(inputs)) == wanted)
         .expect("a gate is not constant, and all other classes of three cues are listed");
     name
 }
@@ -115,7 +118,7 @@ mod tests {
         let names: Vec<String> = splits
             .tasks()
             .iter()
-            .map(|split| gate(split, 2).name)
+            .map(|split| gate(split, 2).unwrap().name)
             .collect();
         let expected = ["OR", "b and not a", "a and not b", "AND", "a", "b", "XOR"];
         assert_eq!(names, expected);
@@ -127,21 +130,25 @@ mod tests {
         let splits = Grouping::all_splits(&inputs, false).unwrap();
         let mut classes = std::collections::BTreeMap::<&str, usize>::new();
         for split in splits.tasks() {
-            *classes.entry(class_of_three(&gate(split, 3))).or_default() += 1;
+            *classes
+                .entry(class_of_three(&gate(split, 3).unwrap()))
+                .or_default() += 1;
         }
         // Each split stands for two truth tables; the published sizes of the classes.
         let sizes: Vec<usize> = OF_THREE.iter().map(|(name, _)| 2 * classes[name]).collect();
         assert_eq!(sizes, [6, 24, 6, 16, 48, 24, 24, 24, 8, 16, 8, 48, 2]);
-        for (name, bright) in OF_THREE {
-            let dark: Vec<u8> = (0..8).filter(|input| !bright.contains(input)).collect();
-            let split = &Grouping::two_groups(&dark, bright).unwrap();
-            assert_eq!(class_of_three(&gate(&split.tasks()[0], 3)), name);
+        for (name, true_for) in OF_THREE {
+            let others: Vec<u8> = (0..8).filter(|input| !true_for.contains(input)).collect();
+            let split = &Grouping::two_groups(&others, true_for).unwrap();
+            assert_eq!(class_of_three(&gate(&split.tasks()[0], 3).unwrap()), name);
         }
     }
 
     #[test]
     fn gates_of_more_cues_are_called_by_their_truth_tables() {
         let split = Grouping::two_groups(&[0, 2, 3, 4, 5, 6], &[1, 7]).unwrap();
-        assert_eq!(gate(&split.tasks()[0], 3).name, "10000010");
+        assert_eq!(gate(&split.tasks()[0], 3).unwrap().name, "10000010");
+        let partial = Grouping::two_groups(&[0], &[3]).unwrap();
+        assert_eq!(gate(&partial.tasks()[0], 2), None);
     }
 }

@@ -155,6 +155,12 @@ fn all_four_inputs_are_shown_side_by_side() {
         )
         .ended(0, &[]);
     sandbox
+        .run("replay -a gallery:gates -f html --side-by-side")
+        .ended(2, &["side-by-side", "GIF and PNG"]);
+    sandbox
+        .run("replay -a gallery:gates -f png --side-by-side --width 4000")
+        .ended(2, &["width", "4096"]);
+    sandbox
         .run("replay -a run -f gif --side-by-side")
         .ended(2, &["side by side", "fresh rollout"]);
 }

@@ -162,10 +162,17 @@ pub(crate) fn make(
     wanted: &PicturesWanted,
 ) -> Result<Vec<PathBuf>, Error> {
     let failed = |error: PictureError| match error {
-        PictureError::Size { .. } => Error::usage(error.to_string()).about("width"),
+        PictureError::Size { .. } | PictureError::Large { .. } => {
+            Error::usage(error.to_string()).about("width")
+        }
         PictureError::OneRollout => Error::usage(error.to_string()).about("side_by_side"),
         error => error.into(),
     };
+    let is_picture = |(format, _): &(Format, PathBuf)| matches!(format, Format::Gif | Format::Png);
+    if wanted.side_by_side && !wanted.files.iter().any(is_picture) {
+        let text = "it is for GIF and PNG; the page has a button for it";
+        return Err(Error::usage(text.to_string()).about("side_by_side"));
+    }
     let mut made = Vec::new();
     let recording = &replay.recording;
     let title = format!("morphcog: robot {}", recording.robot);

@@ -119,7 +119,7 @@ pub(crate) fn evolution(console: &Console, finished: &EvolveOutcome, out: &Path,
     }
 }
 
-/// Writes what gates do under what cues and starts can do.
+/// Writes where each gate switches, and how robust it is.
 pub(crate) fn gate_walks(console: &Console, gates: &[GateWalks]) {
     if gates.is_empty() {
         return;
@@ -141,20 +141,28 @@ pub(crate) fn gate_walks(console: &Console, gates: &[GateWalks]) {
             gate.audit.clone().unwrap_or("–".to_string()),
             format!("{} / {}", levels(&a_dark), levels(&a_bright)),
             format!("{} / {}", levels(&b_dark), levels(&b_bright)),
-            format!("{} of {}", gate.starts.right, gate.starts.all),
-            format!("{} of {}", gate.changes.right, gate.changes.all),
+            format!("{} of {}", gate.starts.correct, gate.starts.all),
+            format!("{} of {}", gate.changes.correct, gate.changes.all),
         ]
     };
     let headers = [
-        "gate", "true", "robot", "fitness", "audit", "a turns", "b turns", "starts", "changes",
+        "gate",
+        "if true",
+        "robot",
+        "fitness",
+        "audit",
+        "a switches",
+        "b switches",
+        "starts",
+        "changes",
     ];
     console.table(&headers, &gates.iter().map(row).collect::<Vec<_>>());
     console.line(
-        "a turns, b turns: the brightness of a cue at which the robot turns round, the other cue \
-         dark / bright",
+        "a switches, b switches: the brightness of the cue at which the walk reverses, with the other \
+         cue dark / bright",
     );
     console.line(
-        "starts: right from raised starts; changes: right after every change of the cues on the way",
+        "starts: correct walks from raised starts; changes: correct walks after the input changes mid-walk",
     );
 }
 
@@ -213,10 +221,10 @@ fn classes_of_gates(console: &Console, found: &[FoundGate]) {
     };
     let headers = [
         "class of gates",
-        "right",
+        "found",
         "fitness",
         "table",
-        "true",
+        "if true",
         "robot",
     ];
     console.table(&headers, &classes.into_iter().map(row).collect::<Vec<_>>());
@@ -231,13 +239,13 @@ fn gates(console: &Console, run: &RunFile, found: &[FoundGate]) {
         } = found;
         vec![
             gate.name.clone(),
-            format!("{} for {}", side.name(), names.list(&gate.bright)),
+            format!("{} for {}", side.name(), names.list(&gate.true_for)),
             number::fixed(robot.objective, 2),
             walks(&run.training_images, &robot.displacements, &names),
             robot.id.clone(),
         ]
     };
-    let headers = ["gate", "true: walks", "fitness", "displacements", "robot"];
+    let headers = ["gate", "if true", "fitness", "displacements", "robot"];
     console.table(&headers, &found.iter().map(row).collect::<Vec<_>>());
 }
 

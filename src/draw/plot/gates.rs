@@ -57,7 +57,7 @@ pub(crate) fn gates(all: &[GateWalks], of: &str) -> Figure {
         let lines = names.map(|material| (material, robot::plain(material), material.name()));
         robot::legend(&mut canvas, at, lines, panel);
     }
-    let name = "walk [voxel lengths], right positive, strongest from ±10; a dot where the gate should be true";
+    let name = "displacement [voxel lengths], positive to the right; full colour from ±10; dots mark inputs for which the gate is true";
     let axis = Axis::exact(-STRONG, STRONG, 4);
     let shade = |walk: f64| scales::diverging(walk / STRONG);
     let bar = [MARGIN + 6.0, below];
@@ -92,7 +92,7 @@ fn draw(canvas: &mut Canvas, [left, top]: [f64; 2], [panel, side]: [f64; 2], gat
     } = gate;
     let kept = format!(
         "raised starts {}/{}, changes {}/{}",
-        starts.right, starts.all, changes.right, changes.all
+        starts.correct, starts.all, changes.correct, changes.all
     );
     canvas.fitted([left, below + 5.0 * ROW - 1.0], &kept, panel, faint);
 }
@@ -110,7 +110,7 @@ fn map(canvas: &mut Canvas, at: [f64; 2], side: f64, gate: &GateWalks) {
     });
     robot::squares(canvas, at, cell, 0.0, squares);
     canvas.frame(at, [side; 2], Pen::new(colour::INK, 0.6));
-    for &input in &gate.gate.bright {
+    for &input in &gate.gate.true_for {
         let (a, b) = (input & 2 != 0, input & 1 != 0);
         let along = |is_bright: bool| (last as f64 * f64::from(u8::from(is_bright)) + 0.5) * cell;
         let dot = [at[0] + along(b), at[1] + side - along(a)];

@@ -8,7 +8,10 @@ const PAGE = 15;
 export class Images {
   constructor(chosen) {
     this.chosen = chosen; this.sets = []; this.set = null; this.class = 0; this.from = 0; this.picked = null;
-    $("set").onchange = () => this.open($("set").value);
+    $("set").onchange = async () => {
+      await this.open($("set").value);
+      if (this.set.cues && this.shown[0]) this.choose(this.shown[0]);
+    };
     $("newer").onclick = () => this.turn(-PAGE);
     $("older").onclick = () => this.turn(PAGE);
     $("lucky").onclick = () => this.lucky();
@@ -41,7 +44,8 @@ export class Images {
   // Images of cues are switched one cue at a time, and a walk goes on meanwhile.
   switches() {
     const cues = this.set.cues ?? 0;
-    if (cues || !$("cues").hidden) $("manner").value = cues ? "on" : "fresh";
+    if (cues && $("cues").hidden) { this.manner = $("manner").value; $("manner").value = "on"; }
+    if (!cues && !$("cues").hidden) $("manner").value = this.manner;
     $("cues").hidden = !cues;
     if (cues) $("tab-test").click();
     for (const id of ["classes", "thumbs", "newer", "older", "lucky"]) $(id).hidden = !!cues;
@@ -49,8 +53,9 @@ export class Images {
       const button = element("button", { type: "button" }), bit = 1 << (cues - 1 - cue);
       button.dataset.bit = bit;
       button.onclick = async () => {
-        await this.show(this.class ^ bit);
-        this.choose(this.shown[0]);
+        const wanted = this.class ^ bit;
+        await this.show(wanted);
+        if (this.class === wanted && this.shown[0]?.label === wanted) this.choose(this.shown[0]);
       };
       return button;
     }));
@@ -77,7 +82,9 @@ export class Images {
   draw() {
     for (const button of $("cues").children) {
       const is = !!(this.class & button.dataset.bit);
-      button.textContent = `Cue ${"abcd"[[...$("cues").children].indexOf(button)]}: ${is ? "bright" : "dark"}`;
+      const cue = `Cue ${"abcd"[[...$("cues").children].indexOf(button)]}`;
+      button.textContent = `${cue}: ${is ? "bright" : "dark"}`;
+      button.setAttribute("aria-label", `${cue} bright`);
       button.setAttribute("aria-pressed", String(is));
     }
     const ink = hex(css("ink"));
