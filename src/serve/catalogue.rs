@@ -558,19 +558,19 @@ mod tests {
         write(runs.path(), "a", &good.replacen('{', "[", 1));
         file.set_modified(modified).unwrap();
         assert_eq!(
-            (known(&catalogue), catalogue.list()[3].changes),
+            (known(&catalogue), catalogue.list()[4].changes),
             (vec!["a".to_string()], 0)
         );
         write(runs.path(), "a", good);
         file.set_modified(modified).unwrap();
         assert_eq!(
-            (known(&catalogue), catalogue.list()[3].changes),
+            (known(&catalogue), catalogue.list()[4].changes),
             (vec!["a".to_string()], 0)
         );
         file.set_modified(modified + Duration::from_millis(1))
             .unwrap();
         assert_eq!(
-            (known(&catalogue), catalogue.list()[3].changes),
+            (known(&catalogue), catalogue.list()[4].changes),
             (vec!["a".to_string()], 1)
         );
     }
@@ -583,7 +583,7 @@ mod tests {
         let reads = catalogue.watch.lock().unwrap();
         assert_eq!(
             (catalogue.list().len(), catalogue.collections().len()),
-            (3, 3)
+            (4, 4)
         );
         assert!(catalogue.collection(0).is_ok() && catalogue.course(0).is_err());
         drop(reads);
