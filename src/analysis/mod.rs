@@ -2,6 +2,7 @@
 
 pub(crate) mod baselines;
 pub(crate) mod dossier;
+pub(crate) mod gates;
 pub(crate) mod progress;
 pub(crate) mod published;
 pub(crate) mod sweep;

@@ -5,7 +5,6 @@ use crate::base::error::Error;
 use crate::base::observer::Work;
 use crate::base::remedy::Remedy;
 use crate::base::session::Session;
-use crate::base::stop::Stopped;
 use crate::base::text::counted;
 use crate::body::Body;
 use crate::config::Config;
@@ -25,11 +24,10 @@ use crate::store::results::replaced;
 use crate::store::run::{Robot, RunFile};
 use crate::store::unwritten::Unwritten;
 use crate::task::class_names::ClassNames;
-use crate::task::evaluation::fresh_rollouts;
+use crate::task::evaluation::displacements_in;
 use crate::task::fitness::Fitness;
 use crate::task::grouping::Grouping;
 use crate::task::perturbation::{Perturbation, PerturbedSetting};
-use crate::task::protocol::RolloutMode;
 use crate::task::rollout::walk;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -413,26 +411,6 @@ impl Trial {
             rollouts,
         })
     }
-}
-
-/// Returns the displacements in a setting, or `None` if a rollout is unstable.
-fn displacements_in(
-    setting: &PerturbedSetting,
-    session: &Session,
-) -> Result<Option<Vec<f64>>, Stopped> {
-    let PerturbedSetting {
-        body,
-        physics,
-        protocol,
-        stimuli,
-    } = setting;
-    if protocol.rollout == RolloutMode::Fresh {
-        let (found, _) = fresh_rollouts(body, stimuli, &[], (physics, protocol), &|_| (), session)?;
-        return Ok(found.into_iter().map(Result::ok).collect());
-    }
-    let system = Arc::new(System::new(body, physics.clone()));
-    let walked = StepError::outcome(walk(&system, protocol, stimuli, false, session.stop))?;
-    Ok(walked.ok().map(|(displacements, _)| displacements))
 }
 
 #[cfg(test)]

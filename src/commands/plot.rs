@@ -1,5 +1,7 @@
 //! `morphcog plot`: writes figures as SVG and PNG.
 
+use crate::analysis;
+use crate::analysis::gates::GateWalks;
 use crate::analysis::progress::Progress;
 use crate::base::error::Error;
 use crate::base::remedy::{Invocation, Remedy};
@@ -10,8 +12,6 @@ use crate::draw::error::write_whole;
 use crate::draw::plot;
 use crate::draw::plot::{Background, Figure, PRINT};
 use crate::robots::published;
-use crate::search;
-use crate::search::gates::GateWalks;
 use crate::search::one_by_one::Named;
 use crate::shipped::exists;
 use crate::store::capacity::CapacityFile;
@@ -199,7 +199,7 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
     } else if wanted.kind == FigureKind::Gates {
         for path in &archives {
             let source = StoredRun::read(path)?;
-            let found = search::gates::walks(&source, session)?;
+            let found = analysis::gates::walks(&source, session)?;
             let figure = plot::gates(&found, &source.run.name);
             let stem = stem(path, wanted.kind, "");
             write(Made { figure, stem })?;

@@ -152,7 +152,7 @@ impl Dataset {
             return Dataset::builtin(BuiltinDigits::default(), wanted);
         }
         if let Some(gates) = Gates::named(name) {
-            return Ok(Dataset::gates(name, gates, wanted));
+            return Ok(Dataset::gates(gates, wanted));
         }
         let place = files::choose(name, given)?;
         let described = Description::read(&place.path).map_err(DatasetError::Description)?;
@@ -206,13 +206,13 @@ impl Dataset {
     }
 
     /// Makes the images of gates; those of both splits are the same.
-    pub(crate) fn gates(name: &str, gates: Gates, wanted: &[Split]) -> Self {
+    pub(crate) fn gates(gates: Gates, wanted: &[Split]) -> Self {
         let loaded = |&split: &Split| {
             let labels = (0..=u8::MAX).take(gates.len()).collect();
             (split, Loaded::new(labels, Images::Gates(gates)))
         };
         Dataset {
-            name: name.to_string(),
+            name: gates.name().to_string(),
             folder: None,
             origin: DRAWN.to_string(),
             class_names: ClassNames::of(&gates.class_names()),

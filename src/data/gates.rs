@@ -26,6 +26,10 @@ impl Gates {
         Some(Gates { cues: 2 + place })
     }
 
+    pub(crate) fn name(self) -> &'static str {
+        NAMES[self.cues - 2]
+    }
+
     /// Returns the number of images in each split.
     pub(crate) fn len(self) -> usize {
         1 << self.cues

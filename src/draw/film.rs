@@ -2,7 +2,7 @@
 //! of all rollouts side by side.
 
 use crate::draw::colour;
-use crate::draw::error::PictureError;
+use crate::draw::error::{PictureError, WIDTHS};
 use crate::draw::raster;
 use crate::draw::scene::Look;
 use crate::draw::stage::Stage;
@@ -11,9 +11,6 @@ use tiny_skia::{Pixmap, PixmapPaint, Transform};
 
 /// Line between pictures side by side, pixels.
 const GAP: u32 = 2;
-
-/// Most pixels of a side of pictures side by side: a film keeps dozens in memory.
-const MOST: u32 = 4096;
 
 /// A picture of a film.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -68,7 +65,8 @@ impl<'a> Film<'a> {
             side_by_side,
         };
         let [width, height] = film.size();
-        match side_by_side && width.max(height) > MOST {
+        // A film keeps dozens of pictures in memory.
+        match side_by_side && width.max(height) > *WIDTHS.end() {
             true => Err(PictureError::Large { width, height }),
             false => Ok(film),
         }

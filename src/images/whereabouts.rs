@@ -120,7 +120,7 @@ impl Whereabouts {
     /// The error says what is missing or broken, where it was looked for, and what to do.
     pub fn load(&self, config: &DataConfig, wanted: &[Split]) -> Result<Dataset, Error> {
         if let Some(gates) = Gates::named(&config.dataset) {
-            let images = Dataset::gates(&config.dataset, gates, wanted);
+            let images = Dataset::gates(gates, wanted);
             return Ok(images.called(&config.class_names));
         }
         if config.dataset == BUILTIN {

@@ -5,9 +5,9 @@ use crate::base::session::Session;
 use crate::base::stop::Stopped;
 use crate::body::Body;
 use crate::sim::{Physics, StepError, System, Unstable, Worlds};
-use crate::task::perturbation::{Condition, Perturbation, PerturbationKind};
+use crate::task::perturbation::{Condition, Perturbation, PerturbationKind, PerturbedSetting};
 use crate::task::protocol::{Protocol, RolloutMode};
-use crate::task::rollout::{Rollout, fresh_rollout, fresh_rollouts_of, same_to_sensors};
+use crate::task::rollout::{Rollout, fresh_rollout, fresh_rollouts_of, same_to_sensors, walk};
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -200,6 +200,26 @@ pub(crate) fn fresh_rollouts_so_far(
         Err(Stopped)
     };
     (found, rolled.len(), ended)
+}
+
+/// Returns the displacements in a setting, or `None` if a rollout is unstable.
+pub(crate) fn displacements_in(
+    setting: &PerturbedSetting,
+    session: &Session,
+) -> Result<Option<Vec<f64>>, Stopped> {
+    let PerturbedSetting {
+        body,
+        physics,
+        protocol,
+        stimuli,
+    } = setting;
+    if protocol.rollout == RolloutMode::Fresh {
+        let (found, _) = fresh_rollouts(body, stimuli, &[], (physics, protocol), &|_| (), session)?;
+        return Ok(found.into_iter().map(Result::ok).collect());
+    }
+    let system = Arc::new(System::new(body, physics.clone()));
+    let walked = StepError::outcome(walk(&system, protocol, stimuli, false, session.stop))?;
+    Ok(walked.ok().map(|(displacements, _)| displacements))
 }
 
 /// A finished rollout: of one image if fresh; of all up to the robot's drop-out if sequential.

@@ -1,5 +1,7 @@
 //! The results of commands.
 
+use crate::analysis;
+use crate::analysis::gates::{FoundGate, GateWalks};
 use crate::analysis::published;
 use crate::base::clock::CLOCK;
 use crate::base::error::Error;
@@ -20,8 +22,6 @@ use crate::data::fetch::{FetchOutcome, Fetched};
 use crate::data::gates::Gates;
 use crate::draw::report::tables::of_robot;
 use crate::robots::published::Published;
-use crate::search;
-use crate::search::gates::{FoundGate, GateWalks};
 use crate::store::capacity::CapacityFile;
 use crate::store::eval::{EvalFile, RobotReport};
 use crate::store::images::{HeldOut, ImageRef};
@@ -51,7 +51,7 @@ pub(crate) fn evolution(console: &Console, finished: &EvolveOutcome, out: &Path,
         });
         return console.event("finished", &done);
     }
-    match search::gates::found(run, |_| true) {
+    match analysis::gates::found(run, |_| true) {
         found if found.is_empty() => fittest(console, run),
         found if Gates::named(&run.config.data.dataset) == Some(Gates { cues: 3 }) => {
             classes_of_gates(console, &found);

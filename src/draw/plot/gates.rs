@@ -1,6 +1,7 @@
 //! The figure of logic gates: each gate's body, how it walks under every input (its truth table),
 //! and how at every brightness of two cues.
 
+use crate::analysis::gates::{GateWalks, LEVELS};
 use crate::base::number;
 use crate::body::Material;
 use crate::draw::colour;
@@ -9,7 +10,6 @@ use crate::draw::plot::axes::{Axis, MARGIN, colour_bar, heading};
 use crate::draw::plot::canvas::{Canvas, Pen, TextStyle};
 use crate::draw::plot::figure::{Figure, PAGE};
 use crate::draw::plot::{robot, scales};
-use crate::search::gates::{GateWalks, LEVELS};
 
 /// Panels beside each other.
 const COLUMNS: usize = 4;

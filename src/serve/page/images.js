@@ -51,7 +51,7 @@ export class Images {
     for (const id of ["classes", "thumbs", "newer", "older", "lucky"]) $(id).hidden = !!cues;
     $("cues").replaceChildren(...Array.from({ length: cues }, (_, cue) => {
       const button = element("button", { type: "button" }), bit = 1 << (cues - 1 - cue);
-      button.dataset.bit = bit;
+      button.dataset.bit = bit; button.dataset.cue = `Cue ${"abcd"[cue]}`;
       button.onclick = async () => {
         const wanted = this.class ^ bit;
         await this.show(wanted);
@@ -81,8 +81,7 @@ export class Images {
 
   draw() {
     for (const button of $("cues").children) {
-      const is = !!(this.class & button.dataset.bit);
-      const cue = `Cue ${"abcd"[[...$("cues").children].indexOf(button)]}`;
+      const is = !!(this.class & button.dataset.bit), { cue } = button.dataset;
       button.textContent = `${cue}: ${is ? "bright" : "dark"}`;
       button.setAttribute("aria-label", `${cue} bright`);
       button.setAttribute("aria-pressed", String(is));

@@ -8,21 +8,18 @@ use crate::base::session::Session;
 use crate::base::stop::Stopped;
 use crate::body::Body;
 use crate::data::gates::Gates;
-use crate::sim::{StepError, System};
 use crate::store::audit::{AuditFile, RobotAudit};
 use crate::store::run::{Robot, RunFile};
 use crate::store::stored_run::StoredRun;
 use crate::task::answer::{Assignment, Direction, is_correct};
-use crate::task::evaluation::fresh_rollouts;
+use crate::task::evaluation::{displacements_in, fresh_rollouts};
 use crate::task::fitness::Group;
 use crate::task::gates::{Gate, gate};
 use crate::task::grouping::ClassSplit;
-use crate::task::perturbation::condition;
+use crate::task::perturbation::{PerturbedSetting, condition};
 use crate::task::protocol::{Protocol, RolloutMode};
-use crate::task::rollout::walk;
 use crate::task::stimulus::stimulus;
 use rayon::prelude::*;
-use std::sync::Arc;
 
 /// Brightnesses of each cue, from dark to bright.
 pub(crate) const LEVELS: usize = 11;
@@ -232,17 +229,19 @@ fn of_gate(
     let raised = walk_all(&images, &conditions)?;
     let starts = right(starts.iter().map(|at| at.0).zip(raised).collect());
 
-    let sequential = protocol(RolloutMode::Sequential);
-    let system = Arc::new(System::new(body, config.physics.clone()));
     let pairs: Vec<(usize, usize)> = (0..16)
         .map(|k| (k / 4, k % 4))
         .filter(|(before, after)| before != after)
         .collect();
     let after = |&(before, after): &(usize, usize)| -> Result<(usize, Option<f64>), Stopped> {
-        let shown = [inputs[before].clone(), inputs[after].clone()];
-        let walked = walk(&system, &sequential, &shown, false, session.stop);
-        let walked = StepError::outcome(walked)?;
-        Ok((after, walked.ok().map(|(walks, _)| walks[1])))
+        let shown = PerturbedSetting {
+            body: body.clone(),
+            physics: config.physics.clone(),
+            protocol: protocol(RolloutMode::Sequential),
+            stimuli: vec![inputs[before].clone(), inputs[after].clone()],
+        };
+        let walks = displacements_in(&shown, session)?;
+        Ok((after, walks.map(|walks| walks[1])))
     };
     let changes: Vec<_> =
         pool.install(|| pairs.par_iter().map(after).collect::<Result<_, Stopped>>())?;
