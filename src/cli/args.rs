@@ -180,7 +180,8 @@ body: rows from the top; 0 empty, 1 rigid, 2 soft, 3 and 4 muscle (in phase, ant
 sensor (shrinks, expands). stimulus: one pixel per voxel, 0 to 1; or \"stimuli\": [...] with \
 \"switch_every\": 500.
 
-Output: step,com_x,com_y in world units (a voxel is 0.1); with --points also x_0,y_0,… and pixel_0_0,…. \
+Output: step,com_x,com_y in voxel lengths, x from the body's left edge at the start, y from the ground; with \
+--points also x_0,y_0,… and pixel_0_0,…. \
 Exit code 4 if the rollout becomes unstable.")]
     Simulate(SimulateArgs),
     /// Draw a digit and watch robots walk, in the browser.

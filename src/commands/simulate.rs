@@ -226,8 +226,9 @@ impl Scenario {
 }
 
 /// Simulates the scenario and passes the CSV to `line`, line by line: `step,com_x,com_y`, then the
-/// centre of mass \[world units\] before the first and after every control step. `points` adds
-/// every point (`x_0,y_0`, …, in EvoGym's order) and pixel (`pixel_ROW_COLUMN`) of that step.
+/// centre of mass before the first and after every control step. `points` adds every point
+/// (`x_0,y_0`, …, in EvoGym's order) and pixel (`pixel_ROW_COLUMN`) of that step. Positions are in
+/// voxel lengths: x from the body's left edge at the start, y from the ground.
 ///
 /// # Errors
 /// Returns [`crate::base::error::ErrorKind::Unstable`] if it ends early, or the error of `line`.
@@ -239,7 +240,10 @@ pub fn simulate(
     let physics = &scenario.physics;
     let start = scenario.start();
     let mut world = World::new(System::new(&scenario.body, physics.clone()), start);
-    let offset = start.column as f64 * physics.cell_size;
+    let lengths = |[x, y]: [f64; 2]| {
+        let [x, y] = [x, y].map(|coordinate| coordinate / physics.cell_size);
+        [digits17(x), digits17(y - f64::from(physics.ground_row))]
+    };
     let stimuli = scenario.stimuli();
     let dark = Grid::filled(scenario.body.height(), scenario.body.width(), 0.0);
     let mut header = "step,com_x,com_y".to_string();
@@ -250,12 +254,13 @@ pub fn simulate(
     }
     line(header + "\n")?;
     let mut row = |step: u64, world: &World, shown: &Grid<f64>| {
-        let [x, y] = world.centre_of_mass();
-        let mut text = format!("{step},{},{}", digits17(x + offset), digits17(y));
+        let [x, y] = lengths(world.centre_of_mass());
+        let mut text = format!("{step},{x},{y}");
         if points {
             world
                 .points()
-                .for_each(|[x, y]| text += &format!(",{},{}", digits17(x + offset), digits17(y)));
+                .map(lengths)
+                .for_each(|[x, y]| text += &format!(",{x},{y}"));
             shown
                 .cells()
                 .iter()
