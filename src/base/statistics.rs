@@ -1,6 +1,6 @@
 //! Spreads and intervals.
 
-use crate::base::random::{Purpose, stream};
+use crate::base::random::{Purpose, Stream, stream};
 
 /// Returns the 95 % Wilson score interval of a proportion (Wilson 1927).
 pub(crate) fn wilson(right: usize, total: usize) -> [f64; 2] {
@@ -38,6 +38,26 @@ pub(crate) fn standard_deviation(values: &[f64]) -> Option<f64> {
     (values.len() > 1).then(|| (squares / (n - 1.0)).sqrt())
 }
 
+/// Draws a resample of all values and returns its mean. With several clusters, clusters are drawn
+/// first, then as many values within each. No cluster may be empty.
+pub(crate) fn resampled_mean(clusters: &[&Vec<f64>], rng: &mut Stream) -> f64 {
+    let (mut sum, mut count) = (0.0, 0);
+    for _ in 0..clusters.len() {
+        // A single cluster needs no draw.
+        let place = if clusters.len() == 1 {
+            0
+        } else {
+            rng.below(clusters.len())
+        };
+        let values = clusters[place];
+        sum += (0..values.len())
+            .map(|_| values[rng.below(values.len())])
+            .sum::<f64>();
+        count += values.len();
+    }
+    sum / count as f64
+}
+
 /// Returns a 95 % interval of the mean of all values: percentiles of the means of resamples (Efron
 /// 1979), the same every time. Values of one cluster, such as the robots of one run, are not
 /// independent. With several clusters, clusters are drawn first, then as many values within each
@@ -52,24 +72,8 @@ pub(crate) fn bootstrap(clusters: &[Vec<f64>]) -> Option<[f64; 2]> {
         return None;
     }
     let mut rng = stream(0, Purpose::Bootstrap, 0, 0);
-    let mut mean = |_| {
-        let (mut sum, mut count) = (0.0, 0);
-        for _ in 0..clusters.len() {
-            // A single cluster needs no draw.
-            let place = if clusters.len() == 1 {
-                0
-            } else {
-                rng.below(clusters.len())
-            };
-            let values = clusters[place];
-            sum += (0..values.len())
-                .map(|_| values[rng.below(values.len())])
-                .sum::<f64>();
-            count += values.len();
-        }
-        sum / count as f64
-    };
-    let mut means: Vec<f64> = (0..RESAMPLES).map(&mut mean).collect();
+    let mean = |_| resampled_mean(&clusters, &mut rng);
+    let mut means: Vec<f64> = (0..RESAMPLES).map(mean).collect();
     means.sort_by(f64::total_cmp);
     Some([
         means[RESAMPLES * 25 / 1000],

@@ -1,6 +1,8 @@
 //! Accuracy over size: a parabola through the points, and the size at which it reaches an accuracy.
 
 use crate::base::number;
+use crate::base::random::{Purpose, stream};
+use crate::base::statistics::resampled_mean;
 use nalgebra::{DMatrix, DVector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -20,10 +22,11 @@ pub enum Crossing {
     },
 }
 
+/// The size in whole neurons or kernels, or a bound, for people.
 impl fmt::Display for Crossing {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Crossing::At(size) => f.write_str(&number::fixed(*size, 1)),
+            Crossing::At(size) => f.write_str(&number::fixed(*size, 0)),
             Crossing::Below { below } => write!(f, "< {below}"),
         }
     }
@@ -84,6 +87,72 @@ pub(crate) fn first_crossing(
     within.min_by(f64::total_cmp).map(Crossing::At)
 }
 
+/// Returns the parabola through points, sorted by x, and the first x at which it reaches a value.
+/// Fewer than three different x have no parabola: the first point that reaches the value counts.
+pub(crate) fn fit_and_crossing(
+    points: &[(f64, f64)],
+    value: f64,
+) -> (Option<[f64; 3]>, Option<Crossing>) {
+    let within = points
+        .first()
+        .zip(points.last())
+        .map(|(first, last)| (first.0, last.0));
+    let fit = parabola(points);
+    let crossing = match fit.zip(within) {
+        Some((fit, within)) => first_crossing(fit, value, within),
+        None => first_of(points, value),
+    };
+    (fit, crossing)
+}
+
+/// Returns a 95 % interval of the crossing of [`fit_and_crossing`]: percentiles over resamples of
+/// the values at each x, whose means are the points, and of the values whose mean is to be reached
+/// (clusters of values that are not independent). The same every time. A bound is the smallest x
+/// where the curve begins above the value, and `None` where it never reaches it. Returns `None` if
+/// there is a single value everywhere, so that nothing can be resampled.
+pub(crate) fn crossing_interval(
+    samples: &[(f64, Vec<f64>)],
+    reached: &[Vec<f64>],
+) -> Option<[Option<f64>; 2]> {
+    // Each resample is fitted anew: ten thousand would take seconds, and move no bound by much.
+    const RESAMPLES: usize = 2000;
+    let reached: Vec<&Vec<f64>> = reached.iter().filter(|values| !values.is_empty()).collect();
+    let is_single = |values: &[f64]| values.len() < 2;
+    if reached.is_empty()
+        || samples.iter().any(|(_, values)| values.is_empty())
+        || samples.iter().all(|(_, values)| is_single(values))
+            && is_single(
+                &reached
+                    .iter()
+                    .copied()
+                    .flatten()
+                    .copied()
+                    .collect::<Vec<_>>(),
+            )
+    {
+        return None;
+    }
+    let mut rng = stream(0, Purpose::Bootstrap, 0, 0);
+    let crossing = |_| {
+        let points: Vec<(f64, f64)> = samples
+            .iter()
+            .map(|(x, values)| (*x, resampled_mean(&[values], &mut rng)))
+            .collect();
+        let value = resampled_mean(&reached, &mut rng);
+        match fit_and_crossing(&points, value).1 {
+            Some(Crossing::At(x) | Crossing::Below { below: x }) => x,
+            None => f64::INFINITY,
+        }
+    };
+    let mut crossings: Vec<f64> = (0..RESAMPLES).map(crossing).collect();
+    crossings.sort_by(f64::total_cmp);
+    let percentiles = [
+        crossings[RESAMPLES * 25 / 1000],
+        crossings[RESAMPLES * 975 / 1000 - 1],
+    ];
+    Some(percentiles.map(|x| x.is_finite().then_some(x)))
+}
+
 /// Returns the first x at which a point is at or above a value; `None` if none is.
 pub(crate) fn first_of(points: &[(f64, f64)], value: f64) -> Option<Crossing> {
     let place = points.iter().position(|(_, y)| *y >= value)?;
@@ -106,6 +175,40 @@ mod tests {
         assert_eq!(first_of(&points, 0.5), Some(Crossing::At(1.0)));
         assert_eq!(first_of(&points, 0.6), Some(Crossing::At(3.0)));
         assert_eq!((first_of(&points, 0.8), first_of(&[], 0.1)), (None, None));
+    }
+
+    #[test]
+    fn the_interval_of_a_crossing_holds_it_and_widens_with_the_spread() {
+        // Accuracies on the parabola 0.5 + 0.02·x − 0.0002·x², which is 0.7 at 11.27, ± a spread.
+        let samples = |spread: f64| -> Vec<(f64, Vec<f64>)> {
+            let at = |x: f64| 0.5 + 0.02 * x - 0.0002 * x * x;
+            (1..=45)
+                .map(f64::from)
+                .map(|x| (x, [-1.0, 0.0, 1.0].map(|k| at(x) + k * spread).to_vec()))
+                .collect()
+        };
+        let interval =
+            |spread: f64, value: f64| crossing_interval(&samples(spread), &[vec![value]]).unwrap();
+        let width = |spread: f64| {
+            let [Some(low), Some(high)] = interval(spread, 0.7) else {
+                panic!("a curve that reaches 0.7 has an interval");
+            };
+            assert!(low < 11.27 && 11.27 < high, "{low} {high}");
+            high - low
+        };
+        assert!(width(0.01) < 0.5 * width(0.05));
+        assert_eq!(interval(0.05, 0.7), interval(0.05, 0.7));
+        // Robots whose accuracies differ widen it, too.
+        let spread = crossing_interval(&samples(0.01), &[vec![0.6, 0.7, 0.8]]).unwrap();
+        assert!(spread[1].unwrap() - spread[0].unwrap() > 2.0 * width(0.01));
+        // Above all points, and below all of them.
+        assert_eq!(interval(0.01, 1.1), [None, None]);
+        assert_eq!(interval(0.01, 0.3), [Some(1.0), Some(1.0)]);
+        let single: Vec<_> = samples(0.0)
+            .into_iter()
+            .map(|(x, values)| (x, values[..1].to_vec()))
+            .collect();
+        assert_eq!(crossing_interval(&single, &[vec![0.7]]), None);
     }
 
     #[test]

@@ -27,6 +27,7 @@ use crate::store::unwritten::Unwritten;
 use crate::task::fitness::Group;
 use crate::task::grouping::{self};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -115,16 +116,15 @@ pub fn capacity(options: &CapacityOptions, session: &Session) -> Result<Capacity
     let mut unwritten = Unwritten::default();
     for split in splits {
         let of_task = of_split(split);
-        let accuracy =
-            of_task.iter().map(|robot| robot.accuracy).sum::<f64>() / of_task.len() as f64;
-        let Some(curves) = networks.curves(split, accuracy)? else {
+        let accuracies = by_run(&of_task);
+        let Some(curves) = networks.curves(split, &accuracies)? else {
             file.stopped = true;
             break;
         };
         file.tasks.push(TaskCapacity {
             task: of_task[0].task.clone(),
             robots: of_task.len(),
-            accuracy,
+            accuracy: mean(&accuracies),
             curves,
         });
         unwritten.tried(write(options, &file), session)?;
@@ -290,25 +290,25 @@ impl Networks<'_> {
         self.done.store(before, Ordering::Relaxed);
     }
 
-    /// Returns the curves of a task whose robots have this accuracy, or `None` if stopped.
+    /// Returns the curves of a task whose robots have these accuracies, or `None` if stopped.
     fn curves(
         &mut self,
         split: &grouping::ClassSplit,
-        accuracy: f64,
+        robots: &[Vec<f64>],
     ) -> Result<Option<Vec<Curve>>, Error> {
         let config = self.config;
         let mut curves = Vec::new();
         for &kind in &config.networks {
             let key = self.key(split, kind);
             let samples = Task::new(split, kind, config, self.images)?;
-            let mut points = Vec::new();
             for size in config.sizes() {
                 if !self.train(&samples, &key, size)? {
                     return Ok(None);
                 }
-                points.push(point(size, &self.known.of(&key, size)[..config.trainings]));
             }
-            curves.push(curve_of(kind, points, accuracy));
+            let trained = |size| (size, &self.known.of(&key, size)[..config.trainings]);
+            let trained: Vec<_> = config.sizes().map(trained).collect();
+            curves.push(curve_of(kind, &trained, robots));
         }
         Ok(Some(curves))
     }
@@ -353,6 +353,20 @@ impl Networks<'_> {
     }
 }
 
+/// Returns the accuracies of robots, by run: robots of one run are not independent.
+fn by_run(robots: &[&RobotReport]) -> Vec<Vec<f64>> {
+    let mut runs: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+    for robot in robots {
+        runs.entry(robot.run).or_default().push(robot.accuracy);
+    }
+    runs.into_values().collect()
+}
+
+fn mean(robots: &[Vec<f64>]) -> f64 {
+    let accuracies = robots.concat();
+    accuracies.iter().sum::<f64>() / accuracies.len() as f64
+}
+
 fn point(size: usize, trained: &[(f64, usize)]) -> Point {
     let accuracies: Vec<f64> = trained.iter().map(|(accuracy, _)| *accuracy).collect();
     let mean = accuracies.iter().sum::<f64>() / accuracies.len().max(1) as f64;
@@ -365,26 +379,27 @@ fn point(size: usize, trained: &[(f64, usize)]) -> Point {
     }
 }
 
-fn curve_of(kind: NetworkKind, points: Vec<Point>, accuracy: f64) -> Curve {
+fn curve_of(kind: NetworkKind, trained: &[(usize, &[(f64, usize)])], robots: &[Vec<f64>]) -> Curve {
+    let points: Vec<Point> = trained
+        .iter()
+        .map(|(size, trained)| point(*size, trained))
+        .collect();
     let means: Vec<(f64, f64)> = points
         .iter()
         .map(|point| (point.size as f64, point.mean))
         .collect();
-    let fit = curve::parabola(&means);
-    let within = means
-        .first()
-        .zip(means.last())
-        .map(|(first, last)| (first.0, last.0));
-    let capacity = match fit.zip(within) {
-        Some((fit, within)) => curve::first_crossing(fit, accuracy, within),
-        // Fewer than three sizes have no parabola.
-        None => curve::first_of(&means, accuracy),
+    let (fit, capacity) = curve::fit_and_crossing(&means, mean(robots));
+    let accuracies = |(size, trained): &(usize, &[(f64, usize)])| {
+        let of_all = trained.iter().map(|(accuracy, _)| *accuracy).collect();
+        (*size as f64, of_all)
     };
+    let samples: Vec<(f64, Vec<f64>)> = trained.iter().map(accuracies).collect();
     Curve {
         network: kind.name().to_string(),
         points,
         fit,
         capacity,
+        interval: curve::crossing_interval(&samples, robots),
     }
 }
 

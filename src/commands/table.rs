@@ -34,6 +34,11 @@ pub(crate) struct TableRow {
     pub(crate) mlp: Option<Crossing>,
     /// Capacity in kernels; `None` without a match.
     pub(crate) cnn: Option<Crossing>,
+    /// The 95 % intervals of both, as in `capacity.json`.
+    #[serde(default)]
+    pub(crate) mlp_interval: Option<[Option<f64>; 2]>,
+    #[serde(default)]
+    pub(crate) cnn_interval: Option<[Option<f64>; 2]>,
     /// The paper's accuracy \[%\].
     pub(crate) paper_accuracy: Option<f64>,
     /// The paper's capacity in neurons; `None` without a match.
@@ -57,6 +62,8 @@ impl TableRow {
             larger_group: None,
             mlp: None,
             cnn: None,
+            mlp_interval: None,
+            cnn_interval: None,
             paper_accuracy: paper.map(|row| row.accuracy),
             paper_mlp: paper.and_then(|row| row.mlp),
             paper_cnn: paper.and_then(|row| row.cnn),
@@ -78,8 +85,10 @@ impl TableRow {
             .get(&self.task)
             .map(|known| 100.0 * known.larger_group);
         let task = capacity.tasks.iter().find(|task| task.task == self.task);
-        let of = |network: &str| task?.size_of(network)?;
-        (self.mlp, self.cnn) = (of("mlp"), of("cnn"));
+        let curve = |network: &str| task?.curve(network);
+        let (mlp, cnn) = (curve("mlp"), curve("cnn"));
+        [self.mlp, self.cnn] = [mlp, cnn].map(|curve| curve?.capacity);
+        [self.mlp_interval, self.cnn_interval] = [mlp, cnn].map(|curve| curve?.interval);
     }
 }
 
@@ -109,6 +118,7 @@ pub(crate) fn write(folder: &Path, scale: f64, rows: &[TableRow]) -> Result<Vec<
         "cnn",
     ];
     let papers = ["paper_accuracy", "paper_mlp", "paper_cnn"];
+    let ends = ["mlp_low", "mlp_high", "cnn_low", "cnn_high"];
     let fields = rows.iter().map(|row| {
         let [low, high] = row
             .interval
@@ -128,11 +138,15 @@ pub(crate) fn write(folder: &Path, scale: f64, rows: &[TableRow]) -> Result<Vec<
             row.larger_group,
         );
         let papers = (row.paper_accuracy, row.paper_mlp, row.paper_cnn);
-        (about, shares, [row.mlp, row.cnn].map(size), papers)
+        let ends = [row.mlp_interval, row.cnn_interval].map(Option::unwrap_or_default);
+        (about, shares, [row.mlp, row.cnn].map(size), papers, ends)
     });
     write_file(
         &csv,
-        &table::csv(about.into_iter().chain(shares).chain(papers), fields),
+        &table::csv(
+            about.into_iter().chain(shares).chain(papers).chain(ends),
+            fields,
+        ),
     )?;
     Ok(vec![json, csv])
 }

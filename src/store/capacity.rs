@@ -1,6 +1,7 @@
 //! `capacity.json`: the networks that match the robots (paper, "Morphological cognition capacity").
 
 use crate::base::error::Error;
+use crate::base::number;
 use crate::base::ranges;
 use crate::base::table;
 use crate::baseline::curve::Crossing;
@@ -81,6 +82,11 @@ pub struct Curve {
     /// The smallest size at which the fit reaches the robots' accuracy, or a note that the smallest
     /// network already exceeds it; null if the fit never reaches it.
     pub(crate) capacity: Option<Crossing>,
+    /// The 95 % interval of the capacity, by a bootstrap over trainings and robots. An end is the
+    /// smallest size where the curve begins above the robots, and null where it never reaches them.
+    /// Null if there is one training of each size and one robot, or in files of earlier versions.
+    #[serde(default)]
+    pub(crate) interval: Option<[Option<f64>; 2]>,
 }
 
 /// Networks of one size.
@@ -126,16 +132,21 @@ impl Stored for CapacityFile {
                         "expected one or more, by size, each size once",
                     ));
                 }
-                let found = match curve.capacity {
-                    None => continue,
-                    Some(Crossing::At(size) | Crossing::Below { below: size }) => size,
-                };
                 let [least, most] =
                     [sizes().min(), sizes().max()].map(|size| size.unwrap_or(0) as f64);
-                if !(least..=most).contains(&found) {
+                let within = |key: &str, found: f64| {
+                    if (least..=most).contains(&found) {
+                        return Ok(());
+                    }
                     let text = format!("expected a size from {least} to {most}, found {found:e}");
-                    return Err(Error::at_key(&at("capacity"), text));
+                    Err(Error::at_key(&at(key), text))
+                };
+                if let Some(Crossing::At(size) | Crossing::Below { below: size }) = curve.capacity {
+                    within("capacity", size)?;
                 }
+                let ends = curve.interval.iter().flatten().flatten();
+                ends.into_iter()
+                    .try_for_each(|end| within("interval", *end))?;
             }
         }
         Ok(())
@@ -217,13 +228,23 @@ impl CapacityFile {
     }
 }
 
+/// Returns a capacity with its interval for people: "17 (14–21)", "< 1", "no match (38 or more)".
+pub(crate) fn spoken(capacity: Option<Crossing>, interval: Option<[Option<f64>; 2]>) -> String {
+    let whole = |size: f64| number::fixed(size, 0);
+    let capacity = capacity.map_or_else(|| "no match".to_string(), |size| size.to_string());
+    match interval {
+        Some([Some(low), Some(high)]) if whole(low) != whole(high) => {
+            format!("{capacity} ({}–{})", whole(low), whole(high))
+        }
+        Some([Some(low), None]) => format!("{capacity} ({} or more)", whole(low)),
+        _ => capacity,
+    }
+}
+
 impl TaskCapacity {
-    /// Returns the capacity for a kind of trained network; the inner `None` means no match.
-    pub fn size_of(&self, network: &str) -> Option<Option<Crossing>> {
-        self.curves
-            .iter()
-            .find(|curve| curve.network == network)
-            .map(|curve| curve.capacity)
+    /// Returns the curve of a kind of network, if it was trained.
+    pub fn curve(&self, network: &str) -> Option<&Curve> {
+        self.curves.iter().find(|curve| curve.network == network)
     }
 }
 
@@ -231,5 +252,10 @@ impl Curve {
     /// Returns the fit at a size.
     pub(crate) fn value(&self, size: f64) -> Option<f64> {
         self.fit.map(|[c0, c1, c2]| c0 + size * (c1 + size * c2))
+    }
+
+    /// Returns the capacity for people, in whole neurons or kernels, with its interval: "17 (14–21)".
+    pub(crate) fn spoken(&self) -> String {
+        spoken(self.capacity, self.interval)
     }
 }

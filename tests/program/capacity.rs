@@ -171,7 +171,7 @@ fn networks_are_trained_once_and_the_same_on_any_number_of_threads() {
 #[test]
 fn an_evaluation_shows_the_capacity_of_its_robots_and_of_no_others() {
     let sandbox = sandbox();
-    let known = capacity(&sandbox, "").tasks[0].size_of("mlp").unwrap();
+    let known = capacity(&sandbox, "").tasks[0].clone();
     let eval = |robots: &str| {
         let archives = "--archive runs/3/run.json runs/4/run.json";
         sandbox
@@ -187,11 +187,13 @@ fn an_evaluation_shows_the_capacity_of_its_robots_and_of_no_others() {
         .skip_while(|line| !line.contains("MLP neurons"))
         .nth(2)
         .unwrap();
-    let known = known.map_or("no match".to_string(), |size| format!("{size:.1}"));
-    assert!(
-        row.starts_with("0|1") && row.contains(&known),
-        "{row} ({known})"
-    );
+    // As the analysis says it: in whole neurons, with the interval.
+    let page = sandbox
+        .run(&format!("capacity --eval runs/eval.json {FEW}"))
+        .ended(0, &[])
+        .out;
+    let said = page.lines().find(|line| line.starts_with("0|1")).unwrap();
+    assert_eq!((row, known.curve("mlp").is_some()), (said, true), "{page}");
     assert!(!eval("top:3").contains("MLP neurons"));
 }
 

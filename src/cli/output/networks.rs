@@ -9,8 +9,8 @@ use crate::commands::capacity::FIGURES;
 use crate::commands::reproduce::ReproduceOutcome;
 use crate::draw::error::{PictureError, write_whole};
 use crate::draw::plot;
-use crate::draw::report::tables::size;
-use crate::store::capacity::{CapacityFile, TaskCapacity};
+use crate::draw::report::tables::published_size;
+use crate::store::capacity::{CapacityFile, Curve, TaskCapacity, spoken};
 use std::path::{Path, PathBuf};
 
 /// Writes the table: task, accuracy and capacity, with the paper's values beside ours. `out` is the
@@ -84,11 +84,11 @@ pub(super) fn papers_table<'a>(
         let paper = published::row(dataset, task);
         let own = |network: &str| {
             capacity
-                .and_then(|known| known.size_of(network))
-                .map_or_else(unknown, size)
+                .and_then(|known| known.curve(network))
+                .map_or_else(unknown, Curve::spoken)
         };
         let theirs = |of: fn(&published::PaperRow) -> Option<f64>| {
-            paper.map_or_else(unknown, |row| size(of(row).map(Crossing::At)))
+            paper.map_or_else(unknown, |row| published_size(of(row)))
         };
         vec![
             task.to_string(),
@@ -135,16 +135,16 @@ pub(crate) fn table(console: &Console, finished: &ReproduceOutcome) {
     }
     let number = |value: Option<f64>| value.map_or_else(unknown, |value| number::fixed(value, 1));
     let rows = finished.rows.iter().map(|row| {
-        let own = |value: Option<Crossing>| {
+        let own = |size: Option<Crossing>, interval: Option<[Option<f64>; 2]>| {
             if row.robots == 0 {
                 unknown()
             } else {
-                size(value)
+                spoken(size, interval)
             }
         };
         let paper = |value: Option<f64>| match row.paper_accuracy {
             None => unknown(),
-            Some(_) => size(value.map(Crossing::At)),
+            Some(_) => published_size(value),
         };
         vec![
             row.task.clone(),
@@ -157,9 +157,9 @@ pub(crate) fn table(console: &Console, finished: &ReproduceOutcome) {
             number(row.paper_accuracy),
             number(row.balanced_accuracy),
             number(row.larger_group),
-            own(row.mlp),
+            own(row.mlp, row.mlp_interval),
             paper(row.paper_mlp),
-            own(row.cnn),
+            own(row.cnn, row.cnn_interval),
             paper(row.paper_cnn),
         ]
     });

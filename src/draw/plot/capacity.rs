@@ -127,7 +127,7 @@ fn panel(
             format!("capacity {below}: the curve begins above the robots"),
             None,
         ),
-        Some(at @ Crossing::At(size)) => (format!("capacity {at} {unit}"), Some(size)),
+        Some(Crossing::At(size)) => (format!("capacity {} {unit}", curve.spoken()), Some(size)),
         None => (
             "no capacity: the curve never reaches the robots".to_string(),
             None,
@@ -229,6 +229,7 @@ mod tests {
             points: (1..=45).map(point).collect(),
             fit: Some([0.55, 0.005, 0.0]),
             capacity,
+            interval: None,
         };
         let task = |name: &str| TaskCapacity {
             task: name.into(),

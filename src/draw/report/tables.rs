@@ -6,13 +6,12 @@ use crate::base::number;
 use crate::base::number::percent;
 use crate::base::text::counted;
 use crate::base::text::duration;
-use crate::baseline::curve::Crossing;
 use crate::data::dataset::Split;
 use crate::draw::html::escape;
 use crate::draw::report::words;
 use crate::sim::InstructionSet;
 use crate::store::audit::{AuditFile, Verdict};
-use crate::store::capacity::CapacityFile;
+use crate::store::capacity::{CapacityFile, Curve};
 use crate::store::eval::{EvalFile, Mean, RobotReport};
 use crate::store::images::HeldOut;
 
@@ -337,7 +336,7 @@ pub(super) fn audit(audit: &AuditFile) -> String {
 
 pub(super) fn capacity(file: &CapacityFile) -> String {
     let rows = file.tasks.iter().map(|task| {
-        let own = |network: &str| or_none(task.size_of(network), size);
+        let own = |network: &str| or_none(task.curve(network), Curve::spoken);
         let paper = published::row(&file.dataset, &task.task);
         vec![
             task.task.clone(),
@@ -345,9 +344,9 @@ pub(super) fn capacity(file: &CapacityFile) -> String {
             percent(task.accuracy),
             or_none(paper, |row| number::fixed(row.accuracy, 1)),
             own("mlp"),
-            or_none(paper, |row| size(row.mlp.map(Crossing::At))),
+            or_none(paper, |row| published_size(row.mlp)),
             own("cnn"),
-            or_none(paper, |row| size(row.cnn.map(Crossing::At))),
+            or_none(paper, |row| published_size(row.cnn)),
         ]
     });
     let headers = [
@@ -378,8 +377,9 @@ pub(super) fn capacity(file: &CapacityFile) -> String {
     )
 }
 
-pub(crate) fn size(capacity: Option<Crossing>) -> String {
-    capacity.map_or_else(|| "no match".to_string(), |size| size.to_string())
+/// Returns a capacity that the paper published, with its digits.
+pub(crate) fn published_size(capacity: Option<f64>) -> String {
+    capacity.map_or_else(|| "no match".to_string(), |size| number::fixed(size, 1))
 }
 
 /// Returns the first cells of a row about an evaluated robot: robot, task, fitness, accuracy, its
