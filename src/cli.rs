@@ -50,6 +50,7 @@ use crate::search::one_by_one::Named;
 use crate::shipped::gallery;
 use crate::sim::{FloatEnvironment, InstructionSet};
 use crate::store::capacity::CapacityFile;
+use crate::store::eval::EvalFile;
 use crate::store::folder;
 use crate::store::folder::IfExists;
 use crate::store::names::RUN_JSON;
@@ -175,6 +176,15 @@ impl Resources {
 /// Runs a command in a session that signals can stop and that reports to the terminal.
 fn in_session<T>(
     console: &Console,
+    with: Resources,
+    work: impl FnOnce(&Session) -> Result<T, Error>,
+) -> Result<T, Error> {
+    reported(Reporter::new(console), with, work)
+}
+
+/// Runs a command in a session that signals can stop and that reports in this way.
+fn reported<T>(
+    reporter: Reporter,
     Resources {
         threads,
         data,
@@ -182,7 +192,7 @@ fn in_session<T>(
     }: Resources,
     work: impl FnOnce(&Session) -> Result<T, Error>,
 ) -> Result<T, Error> {
-    let (stop, reporter) = (signals::stop_flag()?, Reporter::new(console));
+    let stop = signals::stop_flag()?;
     let session = Session::new(&stop, &reporter)
         .threads(threads.map(usize::from))
         .ranks(ranks)
@@ -251,17 +261,19 @@ fn run_evolve(args: EvolveArgs, console: &Console, ranks: Ranks) -> Result<(), E
             data: args.data,
             ..replay::ReplayOptions::default()
         };
-        replay_best(&out, shown, console)?;
+        replay_best(&out, shown, console, false)?;
     }
     Ok(())
 }
 
-/// Replays the best robot of a run into its folder.
+/// Replays the best robot of a run into its folder, and returns the files. A brief replay says
+/// nothing of them.
 fn replay_best(
     folder: &Path,
     shown: replay::ReplayOptions,
     console: &Console,
-) -> Result<(), Error> {
+    brief: bool,
+) -> Result<Vec<PathBuf>, Error> {
     let (robot, archive) = (BEST.to_string(), Some(folder.join(RUN_JSON)));
     let replay = replay::replay(&replay::ReplayOptions {
         robot,
@@ -270,7 +282,10 @@ fn replay_best(
     })?;
     let wanted =
         pictures::PicturesWanted::beside(folder, &replay.name, &[Format::Gif, Format::Html]);
-    pictures::make(console, &replay, &wanted).map(drop)
+    match brief {
+        true => pictures::write(console, &replay, &wanted),
+        false => pictures::make(console, &replay, &wanted),
+    }
 }
 
 fn run_eval(args: EvalArgs, console: &Console, ranks: Ranks) -> Result<(), Error> {
@@ -298,17 +313,28 @@ fn run_eval(args: EvalArgs, console: &Console, ranks: Ranks) -> Result<(), Error
             ..Resources::of(args.threads, args.data)
         },
         console,
+        false,
     )
+    .map(drop)
 }
 
-fn test(options: &eval::EvalOptions, with: Resources, console: &Console) -> Result<(), Error> {
+/// Tests robots and returns the report. A brief test writes nothing to the terminal but its progress.
+fn test(
+    options: &eval::EvalOptions,
+    with: Resources,
+    console: &Console,
+    brief: bool,
+) -> Result<EvalFile, Error> {
+    let reporter = Reporter::new(console).brief(brief);
     let eval::EvalOutcome {
         file: report,
         unwritten,
-    } = in_session(console, with, |session| eval::eval(options, session))?;
-    let capacity = CapacityFile::of(&report, &options.out);
-    let written = unwritten.is_none().then_some(options.out.as_path());
-    summary::evaluation(console, &report, capacity.as_ref(), written);
+    } = reported(reporter, with, |session| eval::eval(options, session))?;
+    if !brief {
+        let capacity = CapacityFile::of(&report, &options.out);
+        let written = unwritten.is_none().then_some(options.out.as_path());
+        summary::evaluation(console, &report, capacity.as_ref(), written);
+    }
     if let Some(error) = unwritten {
         return Err(error);
     }
@@ -324,7 +350,7 @@ fn test(options: &eval::EvalOptions, with: Resources, console: &Console) -> Resu
         };
         return Err(Error::stopped(text));
     }
-    Ok(())
+    Ok(report)
 }
 
 fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {

@@ -2,11 +2,11 @@
 
 use crate::base::error::{Error, ErrorKind};
 use crate::base::remedy::Remedy;
-use crate::cli::output::console::Console;
+use crate::cli::output::console::{Console, Mode};
+use crate::cli::output::reporters::Reporter;
 use crate::cli::output::summary;
 use crate::cli::values::{seed, threads};
-use crate::cli::{Resources, in_session};
-use crate::cli::{replay_best, test};
+use crate::cli::{Resources, replay_best, reported, test};
 use crate::commands::replay::ShownImage;
 use crate::commands::train;
 use crate::commands::{eval, replay};
@@ -68,6 +68,9 @@ pub(super) struct DemoArgs {
     /// Threads (default: one per core); the result does not depend on it.
     #[arg(long, value_parser = threads())]
     threads: Option<u16>,
+    /// Print every step of the training, and the tables of the test.
+    #[arg(short, long)]
+    verbose: bool,
 }
 
 pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
@@ -86,14 +89,22 @@ pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
         },
     };
     let with = Resources::of(args.threads, None);
-    let finished = in_session(console, with.clone(), |session| {
+    let brief = !args.verbose && console.mode() != Mode::Json;
+    if brief {
+        console
+            .info("training a body to tell zeros from ones, then testing it: some three minutes");
+    }
+    let reporter = Reporter::new(console).brief(brief);
+    let finished = reported(reporter, with.clone(), |session| {
         train::train(&options, session)
     })
     .map_err(|error| match error.kind {
         ErrorKind::Stopped => error.remedy(Remedy::Repeat),
         _ => error,
     })?;
-    summary::training(console, &finished, &options.out);
+    if !brief {
+        summary::training(console, &finished, &options.out);
+    }
     let archive = options.out.join(RUN_JSON);
     let tested = eval::EvalOptions {
         out: archive.with_file_name(EVAL_JSON),
@@ -107,12 +118,17 @@ pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
         cycles: CYCLES,
         dataset: None,
     };
-    test(&tested, with, console)?;
+    let report = test(&tested, with, console, brief)?;
     let shown = replay::ReplayOptions {
         images: new_digits()?,
         ..replay::ReplayOptions::default()
     };
-    replay_best(&options.out, shown, console)
+    let pictures = replay_best(&options.out, shown, console, brief)?;
+    if brief {
+        let robot = report.robots.first().expect("one robot was tested");
+        summary::demo(console, robot, &options.out, &pictures);
+    }
+    Ok(())
 }
 
 /// Returns a zero and a one of the test digits.

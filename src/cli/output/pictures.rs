@@ -161,6 +161,35 @@ pub(crate) fn make(
     replay: &Replay,
     wanted: &PicturesWanted,
 ) -> Result<Vec<PathBuf>, Error> {
+    let made = write(console, replay, wanted)?;
+    let recording = &replay.recording;
+    for phase in &recording.phases {
+        let way = if phase.displacement < 0.0 {
+            "left"
+        } else {
+            "right"
+        };
+        console.line(&format!(
+            "{}: sees {}, moves {} voxel lengths {way}",
+            recording.robot,
+            phase.seen.label,
+            number::fixed(phase.displacement.abs(), 2)
+        ));
+    }
+    if recording.unstable {
+        console.warning("the simulation became unstable and ended early");
+    }
+    made.iter()
+        .for_each(|path| console.line_about(path, &format!("wrote {}", path.display())));
+    Ok(made)
+}
+
+/// Makes the pictures, the view in the terminal among them, and returns the files.
+pub(crate) fn write(
+    console: &Console,
+    replay: &Replay,
+    wanted: &PicturesWanted,
+) -> Result<Vec<PathBuf>, Error> {
     let failed = |error: PictureError| match error {
         PictureError::Size { .. } | PictureError::Large { .. } => {
             Error::usage(error.to_string()).about("width")
@@ -206,23 +235,5 @@ pub(crate) fn make(
         }
         made.push(path.clone());
     }
-    for phase in &recording.phases {
-        let way = if phase.displacement < 0.0 {
-            "left"
-        } else {
-            "right"
-        };
-        console.line(&format!(
-            "{}: sees {}, moves {} voxel lengths {way}",
-            recording.robot,
-            phase.seen.label,
-            number::fixed(phase.displacement.abs(), 2)
-        ));
-    }
-    if recording.unstable {
-        console.warning("the simulation became unstable and ended early");
-    }
-    made.iter()
-        .for_each(|path| console.line_about(path, &format!("wrote {}", path.display())));
     Ok(made)
 }

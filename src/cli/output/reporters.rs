@@ -3,7 +3,7 @@
 use crate::base::error::Error;
 use crate::base::observer::{Generation, Observer, Work};
 use crate::cli::explain::{Explained, explain};
-use crate::cli::output::console::{Bar, Console, Counter};
+use crate::cli::output::console::{Bar, Console, Counter, Mode};
 use std::path::Path;
 use std::sync::{PoisonError, RwLock};
 
@@ -11,6 +11,8 @@ use std::sync::{PoisonError, RwLock};
 pub struct Reporter<'c> {
     console: &'c Console,
     line: RwLock<Line<'c>>,
+    /// True if only progress, findings and warnings are displayed, without notes and file names.
+    brief: bool,
 }
 
 /// The moving part of the screen: at most one line.
@@ -26,7 +28,15 @@ impl<'c> Reporter<'c> {
         Reporter {
             console,
             line: RwLock::new(Line::None),
+            brief: false,
         }
+    }
+
+    /// Leaves out notes and file names, for a command that says at its end what matters. JSON has
+    /// them all the same.
+    pub(crate) fn brief(self, brief: bool) -> Self {
+        let brief = brief && self.console.mode() != Mode::Json;
+        Reporter { brief, ..self }
     }
 
     fn show(&self, line: impl FnOnce() -> Line<'c>) {
@@ -40,12 +50,17 @@ impl<'c> Reporter<'c> {
 
 impl Observer for Reporter<'_> {
     fn note(&self, text: &str) {
-        self.console.info(text);
+        if !self.brief {
+            self.console.info(text);
+        }
     }
 
     fn wrote(&self, path: &Path, about: &str) {
         // Ends the line of the work that made it.
         self.show(|| Line::None);
+        if self.brief {
+            return;
+        }
         let text = format!("wrote {}{about}", path.display());
         self.console.line_about(path, &text);
     }

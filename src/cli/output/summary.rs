@@ -31,7 +31,7 @@ use crate::store::validation::Validated;
 use crate::task::class_names::ClassNames;
 use crate::task::gates::class_of_three;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The number of robots listed after an evolution.
 const SHOWN: usize = 5;
@@ -279,6 +279,27 @@ pub(crate) fn training(console: &Console, finished: &train::TrainOutcome, out: &
         run.config.stimulus.part(*size)
     ));
     console.line(&format!("wrote {}", out.display()));
+}
+
+/// Writes how many new digits the body of a demo reads, where to watch it, and the next step.
+pub(crate) fn demo(console: &Console, robot: &RobotReport, out: &Path, pictures: &[PathBuf]) {
+    let (zero, one) = match robot.first_group_walks.as_str() {
+        "left" => ("left", "right"),
+        _ => ("right", "left"),
+    };
+    console.line(&format!(
+        "Your body reads {} of {} new digits: it walks {zero} for a 0 and {one} for a 1.",
+        robot.right, robot.images
+    ));
+    let pictures: Vec<String> = pictures.iter().map(|path| in_shell(path)).collect();
+    console.line(&format!(
+        "Watch it read two of them: {}",
+        pictures.join(" or ")
+    ));
+    console.suggest(
+        "Draw digits for it yourself:",
+        &format!("morphcog serve --archive {}", in_shell(out)),
+    );
 }
 
 pub(crate) fn validation(console: &Console, best: &[Validated]) {
