@@ -289,7 +289,7 @@ mod tests {
     #[test]
     fn what_is_below_the_smallest_size_is_no_number() {
         for (crossing, text, json) in [
-            (Some(Crossing::At(16.84)), "16.8", "16.84"),
+            (Some(Crossing::At(16.84)), "17", "16.84"),
             (
                 Some(Crossing::Below { below: 1.0 }),
                 "< 1",

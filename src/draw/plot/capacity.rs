@@ -229,7 +229,7 @@ mod tests {
             points: (1..=45).map(point).collect(),
             fit: Some([0.55, 0.005, 0.0]),
             capacity,
-            interval: None,
+            interval: capacity.map(|_| [Some(14.2), Some(20.9)]),
         };
         let task = |name: &str| TaskCapacity {
             task: name.into(),
@@ -256,7 +256,7 @@ mod tests {
     #[test]
     fn every_task_and_network_has_a_panel_with_its_capacity() {
         let svg = capacity(&file(Some(Crossing::At(16.8)))).svg();
-        assert_eq!(svg.matches("capacity 16.8").count(), 4);
+        assert_eq!(svg.matches("capacity 17 (14–21)").count(), 4);
         assert!(
             svg.contains("01|23, CNN") && svg.contains("hidden neurons") && svg.contains("kernels")
         );
