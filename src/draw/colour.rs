@@ -53,6 +53,8 @@ pub(crate) const GRID: Colour = Colour::new(228, 231, 236);
 pub(crate) const PEG: Colour = Colour::new(72, 74, 80);
 /// The path of the centre of mass.
 pub(crate) const TRACE: Colour = Colour::new(178, 24, 158);
+/// The frame around the part of an image that a body covers: visible on black and on white.
+pub(crate) const WINDOW: Colour = Colour::new(255, 176, 0);
 /// The lines between voxels where they are opaque.
 pub(crate) const SEAM: Colour = Colour::new(226, 228, 232);
 pub(crate) const ALARM: Colour = Colour::new(190, 20, 40);

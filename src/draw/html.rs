@@ -219,7 +219,7 @@ fn moments(walk: &Walk, every: usize, unit: f64) -> (Value, Vec<i16>) {
             .rows()
             .flatten()
             .map(|v| (255.0 * v.clamp(0.0, 1.0)).round() as u8);
-        json!({
+        let mut words = json!({
             "first": first,
             "label": phase.seen.label,
             "class": phase.seen.class,
@@ -228,7 +228,11 @@ fn moments(walk: &Walk, every: usize, unit: f64) -> (Value, Vec<i16>) {
             "height": phase.seen.stimulus.height(),
             "width": phase.seen.stimulus.width(),
             "stimulus": BASE64.encode(stimulus.collect::<Vec<u8>>()),
-        })
+        });
+        if let Some(image) = &phase.seen.image {
+            words["image"] = json!(image);
+        }
+        words
     });
     let body = &recording.body;
     let mut rollout = json!({

@@ -97,6 +97,8 @@ pub(crate) struct CollectionSummary {
     pub(crate) name: String,
     /// The path of the run.json; `None` if it is built in.
     pub(crate) path: Option<String>,
+    /// True if the user named it when the page was opened: the page begins with the first of them.
+    pub(crate) chosen: bool,
     pub(crate) robots: usize,
     pub(crate) tasks: Vec<String>,
     pub(crate) dataset: String,
@@ -120,6 +122,8 @@ struct Watched {
 #[derive(Clone)]
 struct Known {
     collection: Arc<Collection>,
+    /// True if the user named it.
+    chosen: bool,
     changes: u64,
 }
 
@@ -189,10 +193,10 @@ impl RobotCatalogue {
             looked: None,
         };
         for path in archives {
-            watch.open(path, &mut notes)?;
+            watch.open(path, true, &mut notes)?;
         }
         if let Some(path) = newest
-            && let Err(error) = watch.open(path, &mut notes)
+            && let Err(error) = watch.open(path, false, &mut notes)
         {
             notes.push(format!("{error}; left out"));
         }
@@ -224,25 +228,36 @@ impl RobotCatalogue {
     }
 
     pub(crate) fn list(&self) -> Vec<CollectionSummary> {
-        let short = |(from, asked, changes): (&Collection, Option<u64>, u64)| CollectionSummary {
-            index: 0,
-            name: from.name.clone(),
-            path: from.path.as_ref().map(|path| path.display().to_string()),
-            robots: from.robots.len(),
-            tasks: from.tasks.clone(),
-            dataset: from.config.data.dataset.clone(),
-            generations: from.generations,
-            asked,
-            changes,
-            best: from.robots.first().map(|robot| robot.fitness),
+        let short = |(from, chosen, asked, changes): (&Collection, bool, Option<u64>, u64)| {
+            CollectionSummary {
+                index: 0,
+                name: from.name.clone(),
+                path: from.path.as_ref().map(|path| path.display().to_string()),
+                chosen,
+                robots: from.robots.len(),
+                tasks: from.tasks.clone(),
+                dataset: from.config.data.dataset.clone(),
+                generations: from.generations,
+                asked,
+                changes,
+                best: from.robots.first().map(|robot| robot.fitness),
+            }
         };
         let archives = self.archives();
-        let built_in = self.built_in.iter().map(|from| (&**from, None, 0));
+        let built_in = self.built_in.iter().map(|from| (&**from, false, None, 0));
         let read = archives.iter().map(
             |Known {
                  collection,
+                 chosen,
                  changes,
-             }| { (&**collection, Some(collection.config.generations), *changes) },
+             }| {
+                (
+                    &**collection,
+                    *chosen,
+                    Some(collection.config.generations),
+                    *changes,
+                )
+            },
         );
         let list = built_in.chain(read).map(short).enumerate();
         list.map(|(index, summary)| CollectionSummary { index, ..summary })
@@ -288,17 +303,18 @@ fn real(path: &Path) -> PathBuf {
 }
 
 impl Watch {
-    fn open(&mut self, path: &Path, notes: &mut Vec<String>) -> Result<(), Error> {
+    fn open(&mut self, path: &Path, chosen: bool, notes: &mut Vec<String>) -> Result<(), Error> {
         let stamps = stamps(path);
         let collection = archive(RunFile::read(path)?, path, notes)?;
-        self.add(path, stamps, collection);
+        self.add(path, stamps, collection, chosen);
         Ok(())
     }
 
-    fn add(&mut self, path: &Path, stamps: Stamps, collection: Collection) {
+    fn add(&mut self, path: &Path, stamps: Stamps, collection: Collection, chosen: bool) {
         self.paths.extend([path.to_path_buf(), real(path)]);
         let known = Known {
             collection: Arc::new(collection),
+            chosen,
             changes: 0,
         };
         self.watched.push(Watched {
@@ -326,7 +342,7 @@ impl Watch {
             match read(&path) {
                 Some(Ok(collection)) => {
                     self.unreadable.remove(&path);
-                    self.add(&path, now, collection);
+                    self.add(&path, now, collection, false);
                 }
                 Some(Err(_)) => _ = self.unreadable.insert(path, now),
                 None => {}

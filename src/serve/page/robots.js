@@ -18,7 +18,8 @@ export class Robots {
   async load() {
     this.list = await get("api/archives");
     this.names();
-    await this.open(0);
+    // An archive that was named when the page was opened comes first.
+    await this.open(Math.max(0, this.list.findIndex((one) => one.chosen)));
   }
 
   names() {
