@@ -2,6 +2,7 @@
 //! voxels help colour-blind viewers tell materials apart.
 
 use crate::body::Material;
+use serde::{Serialize, Serializer};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Colour {
@@ -36,6 +37,13 @@ impl Colour {
     pub(crate) fn gray(intensity: f64) -> Self {
         let level = (255.0 * intensity.clamp(0.0, 1.0)).round() as u8;
         Colour::new(level, level, level)
+    }
+}
+
+impl Serialize for Colour {
+    /// Writes it as `#rrggbb`, as pages need it.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.hex().serialize(serializer)
     }
 }
 

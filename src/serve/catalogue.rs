@@ -4,6 +4,7 @@ use crate::base::error::Error;
 use crate::body::{Body, VoxelCounts};
 use crate::config::Config;
 use crate::data::gates::Gates;
+use crate::draw::plot::cells::CellMap;
 use crate::robots::published;
 use crate::search::held_out_run::task_of;
 use crate::serve::course::Course;
@@ -37,8 +38,8 @@ pub(crate) struct Collection {
     /// The dataset of the run; `None` for published robots.
     pub(crate) dataset: Option<DatasetRef>,
     pub(crate) generations: Option<u64>,
-    /// The bins of the archive's dimensions muscle, sensor and total.
-    pub(crate) bins: Vec<usize>,
+    /// The cells of the archive; `None` if the robots are not those of one archive.
+    pub(crate) map: Option<CellMap>,
     pub(crate) tasks: Vec<String>,
     /// The robots, fittest first.
     pub(crate) robots: Vec<Entry>,
@@ -442,7 +443,7 @@ fn published() -> Result<Collection, Error> {
         name: "Published with the paper".to_string(),
         dataset: None,
         generations: None,
-        bins: Vec::new(),
+        map: None,
         ..all
     })
 }
@@ -467,7 +468,7 @@ fn trained(set: &str, name: &str) -> Result<Collection, Error> {
         name,
         generations: None,
         dataset: None,
-        bins: Vec::new(),
+        map: None,
         tasks,
         robots,
         ..first
@@ -511,11 +512,13 @@ fn of_run(run: RunFile, audit: Option<&AuditFile>) -> Result<Collection, Error> 
     };
     let mut robots: Vec<Entry> = run.elites.iter().map(entry).collect();
     fittest_first(&mut robots);
+    // A training has one robot, and no archive.
+    let map = run.origin.is_none().then(|| CellMap::of(&run));
     Ok(Collection {
         name: format!("{}, seed {}", run.name, run.config.seed),
         path: None,
         generations: Some(run.generations),
-        bins: run.dimensions.bins.iter().take(3).copied().collect(),
+        map,
         tasks: run.dimensions.tasks.clone(),
         dataset: Some(run.dataset),
         config: run.config,

@@ -127,7 +127,7 @@ fn archive(service: &Service, index: &str) -> Result<HttpResponse, HttpRefusal> 
     let collection = service.catalogue.collection(number(index, "archive")?)?;
     let mut words = json!({
         "name": collection.name,
-        "bins": collection.bins,
+        "map": collection.map,
         "tasks": collection.tasks,
         "control_steps": collection.config.protocol.control_steps,
         "dataset": collection.config.data.dataset,
