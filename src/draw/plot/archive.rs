@@ -269,7 +269,7 @@ fn legend(canvas: &mut Canvas, [x, y]: [f64; 2], map: &CellMap) {
     let shared = map.tasks.iter().find(|task| !task.has_own_scale);
     let highest = shared.map_or(0.0, |task| task.highest);
     // Without any fitness above 0, the bar has some length all the same.
-    let axis = Axis::exact(0.0, if highest > 0.0 { highest } else { 1.0 }, 3);
+    let axis = Axis::exact(0.0, if highest > 0.0 { highest } else { 1.0 }, 5);
     let colour = |value| colour_of(value, axis.to);
     let wide = LEGEND[0] - 6.0;
     colour_bar(canvas, [x, y + 7.0], wide, &axis, &name, colour);

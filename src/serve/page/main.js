@@ -57,7 +57,7 @@ const invite = () => {
   if (gate) return say(`This body computes ${gate} of cues, not of drawings: switch them under Test images.`);
   const { left = [], right = [] } = who.robot?.judge ?? {};
   const classes = who.team ? team.classes : left.concat(right).sort((a, b) => a - b);
-  if (!classes.length) return say("Draw anything. This body has no task: only the direction of its walk counts.");
+  if (!classes.length) return say(`Draw anything. This body ${who.own ? "has no task" : "names no class"}: only the direction of its walk counts.`);
   const given = who.team ? team.class_names : who.from.class_names, { a, name } = Drawing.classNames(given);
   if (isDigits(classes, given)) return say("Draw any digit from 0 to 9.");
   const invites = [`Draw ${classes.length > 3 ? "one of " + listed(classes, name, "or") : listed(classes, a, "or")}.`];
