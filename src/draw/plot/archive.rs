@@ -145,12 +145,12 @@ impl Layout {
     }
 
     fn draw(&self, canvas: &mut Canvas, [left, top]: [f64; 2], task: &TaskMap, map: &CellMap) {
-        let corners = self.corners.iter().map(|[x, y]| [left + x, top + y]);
-        for (panel, at) in task.panels.iter().zip(corners.clone()) {
+        for (number, (panel, [x, y])) in task.panels.iter().zip(&self.corners).enumerate() {
+            let at = [left + x, top + y];
             self.panel(canvas, at, panel);
-        }
-        if let (Some(panel), Some(at)) = (task.panels.last(), corners.last()) {
-            self.axes(canvas, at, panel, &map.edges);
+            if number + 1 == task.panels.len() {
+                self.axes(canvas, at, panel, &map.edges);
+            }
         }
     }
 

@@ -78,8 +78,9 @@ impl CellMap {
     pub(crate) fn of(run: &RunFile) -> Self {
         let names = names(run);
         let area = run.config.body.height * run.config.body.width;
-        let space = DescriptorSpace::voxel_counts(names.len());
-        let possible = possible_cells(area, run.config.body.min_muscles, names.len());
+        // Tasks have the same possible cells.
+        let space = DescriptorSpace::voxel_counts(1);
+        let possible = possible_cells(area, run.config.body.min_muscles, 1);
         let possible = possible.into_iter().filter_map(|i| space.coordinates(i));
         let elites = run.elites.iter().map(|robot| (robot.cell.clone(), robot));
         let cells = Cells {
@@ -196,6 +197,7 @@ fn counts(bin: usize, area: usize) -> [usize; 2] {
 }
 
 struct Cells<'a> {
+    /// The cells that a body can be in, without the task.
     possible: BTreeSet<Vec<usize>>,
     elites: BTreeMap<Vec<usize>, &'a Robot>,
     area: usize,
@@ -226,7 +228,7 @@ impl Cells<'_> {
                     fitness: robot.objective,
                     colour: colour(robot.objective, highest),
                 },
-                None if self.possible.contains(&place) => Cell::Empty,
+                None if self.possible.contains(&place[..3]) => Cell::Empty,
                 None => Cell::Impossible,
             }
         };
