@@ -64,7 +64,8 @@ const Drawing = (() => {
       if (!ten && scale < 4) continue;
       ctx.lineWidth = ten ? 1.5 : 1;
       ctx.beginPath(); ctx.moveTo(X(zero + m), surface); ctx.lineTo(X(zero + m), surface + (ten ? 9 : 4)); ctx.stroke();
-      if (m % by === 0) ctx.fillText(m === 0 ? "0" : (m < 0 ? "−" : "+") + Math.abs(m), X(zero + m), surface + 13);
+      // A number that would be cut off at the edge is left out.
+      if (m % by === 0 && X(zero + m) > 16 && X(zero + m) < width - 16) ctx.fillText(m === 0 ? "0" : (m < 0 ? "−" : "+") + Math.abs(m), X(zero + m), surface + 13);
     }
     ctx.lineWidth = 1.5; ctx.beginPath(); ctx.moveTo(0, surface); ctx.lineTo(width, surface); ctx.stroke();
   };

@@ -365,6 +365,11 @@ fn numbers(walk: &Walk, frame: usize, stage: &Stage, out: &mut Vec<Primitive>) {
         let size = SMALL * z;
         let digits = fonts::width(text.trim_start_matches(['+', '−']), size, false);
         let left = at[0] - digits / 2.0 - (fonts::width(&text, size, false) - digits);
+        // A number that would be cut off at the edge is left out.
+        let end = left + fonts::width(&text, size, false);
+        if left < 0.0 || end > f64::from(stage.width) {
+            continue;
+        }
         let at = [left.round(), at[1] + 18.0 * z];
         out.push(Primitive::Text {
             text,

@@ -137,7 +137,7 @@ pub(super) fn archive(
                             colour,
                         } => {
                             let class = if *fitness < 0.0 { "below" } else { "" };
-                            let style = format!("--fill:{}", colour.hex());
+                            let style = format!("background-color:{}", colour.hex());
                             let first = best.as_ref() == Some(robot);
                             let look = Look {
                                 class,
@@ -156,7 +156,7 @@ pub(super) fn archive(
                 }
             }
             out += &format!(
-                "<figure><div class=\"cells\" style=\"--columns:{}\">{cells}</div>\
+                "<figure><div class=\"cells\" data-columns=\"{}\">{cells}</div>\
                  <figcaption>{} voxels</figcaption></figure>\n",
                 panel.columns(),
                 panel.total()
@@ -176,7 +176,7 @@ fn key(map: &CellMap, task: &TaskMap, highest: &str) -> String {
     };
     let below = match map.has_below {
         true => format!(
-            "<span><b class=\"below\" style=\"--fill:{}\"></b> below 0</span>",
+            "<span><b class=\"below\" style=\"background-color:{}\"></b> below 0</span>",
             map.below.hex()
         ),
         false => String::new(),

@@ -147,17 +147,17 @@ export class Robots {
         const text = `${robot.id}: fitness ${signed(robot.fitness, 2)}; ${robot.voxels.muscle} muscle, ${robot.voxels.sensor} sensor of ${robot.voxels.total} voxels`;
         const button = element("button", { type: "button", title: text, className: [robot.fitness < 0 ? "below" : "", shown.has(robot) ? "" : "faded"].join(" ").trim() });
         button.setAttribute("aria-label", text);
-        button.style.setProperty("--fill", cell.elite.colour);
+        button.style.backgroundColor = cell.elite.colour;
         button.dataset.robot = robot.id;
         button.onclick = () => this.choose(robot);
         return button;
       }));
-      cells.style.setProperty("--columns", rows[0].length);
+      cells.dataset.columns = rows[0].length;
       return element("figure", {}, cells, element("figcaption", { textContent: `${voxels[0]}–${voxels[1]} voxels` }));
     });
     const bar = element("i"), unit = map.unit ? ` ${map.unit}` : "", own = task.has_own_scale ? " (a scale of its own, since it dwarfs the other tasks)" : "";
     bar.style.background = `linear-gradient(90deg, ${map.colours.join()})`;
-    const box = (name, text, fill = "") => { const b = element("b", { className: name }); b.style.setProperty("--fill", fill); return element("span", {}, b, text); };
+    const box = (name, text, fill = "") => { const b = element("b", { className: name }); b.style.backgroundColor = fill; return element("span", {}, b, text); };
     const key = element("div", { className: "key" }, element("span", {}, `${map.tasks.length > 1 ? `Task ${task.name}. ` : ""}Muscle voxels to the right, sensor voxels upwards, a panel for each range of voxels in all.`),
       element("span", {}, "Fitness 0", bar, `${signed(task.highest, 2)}${unit}${own}`), ...(map.has_below ? [box("below", "below 0", map.below)] : []), box("empty", "no robot"));
     $("map").replaceChildren(key, ...panels);
