@@ -304,6 +304,13 @@ fn pad_answer_and_what_the_body_knows_are_in_sight_together_on_a_phone_and_on_a_
             );
         }
         assert_eq!(tab.text("#invites"), "Draw any digit from 0 to 9.");
+        // No body touches the edge of its stage: the world is gray, and voxels are not.
+        let cut = "[...document.querySelectorAll('#stages canvas')].filter((canvas) => {
+            const { width, height } = canvas, edge = (...box) => [...canvas.getContext('2d').getImageData(...box).data];
+            const all = [edge(0, 0, 1, height), edge(width - 1, 0, 1, height), edge(0, 0, width, 1)].flat();
+            return all.some((_, k) => k % 4 === 0 && Math.max(...all.slice(k, k + 3)) - Math.min(...all.slice(k, k + 3)) > 60);
+        }).length";
+        assert_eq!(tab.eval(cut), 0);
         let tie =
             "Stages.said({ says: 8, tied: [5, 8], tie_broken_by: 'walks' }, Drawing.classNames())";
         assert_eq!(
