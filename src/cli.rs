@@ -365,11 +365,15 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
         ..
     } = args;
     let (width, every, fps, look) = (args.width, usize::from(args.every), args.fps, args.look);
-    // A wrong file name must be reported before the simulation starts.
+    // Wrong file names and formats must be reported before the simulation starts.
     let named = out
         .as_deref()
         .map(|path| pictures::PicturesWanted::named(path, &format))
         .transpose()?;
+    if args.side_by_side {
+        let formats = named.as_ref().map(|named| named.formats());
+        pictures::check_side_by_side(formats.as_deref().unwrap_or(&format))?;
+    }
     // Without a run, it shows the best body that ships with the program.
     let is_bare = args.archive.is_none() && args.robot == Selection::Ids(vec![BEST.to_string()]);
     let is_first_look = is_bare && folder::newest_run().is_err();

@@ -6,7 +6,7 @@ use crate::base::remedy::Remedy;
 use crate::base::text::counted;
 use crate::config::Config;
 use crate::data::dataset::Split;
-use crate::images::whereabouts::{Whereabouts, load_dataset_of, stimulus_of};
+use crate::images::whereabouts::{Whereabouts, labelled, load_dataset_of};
 use crate::search::held_out_run::control_steps;
 use crate::shipped::exists;
 use crate::store::audit::AuditFile;
@@ -240,12 +240,10 @@ impl Team {
         let names = file.names();
         let seen = |config: &Config| {
             let one = |place: &usize| {
-                let ImageRef { index, label } = file.images[*place];
-                let stimulus = stimulus_of(config, &dataset, split, index)?;
+                let image = file.images[*place];
                 Ok(LabelledStimulus {
-                    class: label,
-                    label: file.images[*place].called(split, &names),
-                    stimulus,
+                    label: image.called(split, &names),
+                    ..labelled(config, &dataset, split, image)?
                 })
             };
             images
@@ -318,17 +316,10 @@ fn images(
     }
     check_length(&run.config, shown.len()).map_err(without)?;
     let one = |image: &ImageRef| {
-        let label = image.called(Split::Train, dataset.class_names());
-        let seen = stimulus_of(&run.config, &dataset, Split::Train, image.index);
-        let seen = seen.map_err(|error| {
+        labelled(&run.config, &dataset, Split::Train, *image).map_err(|error| {
             error
                 .in_place("training_images")
                 .in_place(&path.display().to_string())
-        });
-        Ok(LabelledStimulus {
-            class: image.label,
-            label,
-            stimulus: seen?,
         })
     };
     shown.iter().map(one).collect()

@@ -61,9 +61,30 @@ impl Ballot {
     /// Returns the index of the class with most votes, and true if several tie. Among those the
     /// largest sum of walks wins, then the first.
     pub(crate) fn by_votes(&self) -> (usize, bool) {
+        let first = self.first();
+        (self.largest(first.iter().copied()), first.len() > 1)
+    }
+
+    /// Returns the indices of the classes with most votes.
+    fn first(&self) -> Vec<usize> {
         let most = self.votes.iter().copied().max().unwrap_or(0);
-        let among = || (0..self.votes.len()).filter(|place| self.votes[*place] == most);
-        (self.largest(among()), among().count() > 1)
+        (0..self.votes.len())
+            .filter(|place| self.votes[*place] == most)
+            .collect()
+    }
+
+    /// Returns what breaks a tie of these classes: their sums of walks, or their order if these
+    /// are equal, too.
+    fn tie_breaker(&self, tied: &[usize]) -> TieBreaker {
+        let best = self.sums[self.largest(tied.iter().copied())];
+        match tied
+            .iter()
+            .filter(|place| self.sums[**place] == best)
+            .count()
+        {
+            1 => TieBreaker::Walks,
+            _ => TieBreaker::Order,
+        }
     }
 
     /// Returns the index of the class with the largest sum of walks; the first wins a tie.
@@ -82,6 +103,16 @@ impl Ballot {
     }
 }
 
+/// The rule that decides between classes with equally many votes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum TieBreaker {
+    /// The largest sum of walks.
+    Walks,
+    /// The first class.
+    Order,
+}
+
 /// The walks of a team under one image and their counts, at the end or before.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Tally {
@@ -91,6 +122,10 @@ pub(crate) struct Tally {
     pub(crate) ballot: Ballot,
     /// The class with most votes; `None` while there is no vote.
     pub(crate) says: Option<u8>,
+    /// The classes that share most votes; empty without votes or with a single winner.
+    pub(crate) tied: Vec<u8>,
+    /// The rule by which `says` is one of `tied`; `None` without a tie.
+    pub(crate) tie_broken_by: Option<TieBreaker>,
 }
 
 impl Tally {
@@ -104,10 +139,15 @@ impl Tally {
         let ballot = Ballot::count(classes, walks, threshold, clip);
         let has_votes = ballot.votes.iter().any(|votes| *votes > 0);
         let says = has_votes.then(|| classes[ballot.by_votes().0]);
+        let first = ballot.first();
+        let is_tie = has_votes && first.len() > 1;
+        let tied = first.iter().filter(|_| is_tie).map(|place| classes[*place]);
         Tally {
             moved,
-            ballot,
             says,
+            tied: tied.collect(),
+            tie_broken_by: is_tie.then(|| ballot.tie_breaker(&first)),
+            ballot,
         }
     }
 }
@@ -365,6 +405,29 @@ mod tests {
             (1, true)
         );
         assert_eq!(count(&[]).by_votes(), (0, true));
+    }
+
+    #[test]
+    fn a_tally_names_the_classes_of_a_tie_and_what_breaks_it() {
+        let (a, b) = (sides(&[0], &[1]), sides(&[2], &[1]));
+        let tally = |walks: [f64; 2]| {
+            let moved = walks.map(Some).to_vec();
+            Tally::of(&[0, 1, 2], &[&a, &b], moved, (3.0, CLIP))
+        };
+        let broken = |walks| {
+            let Tally {
+                says,
+                tied,
+                tie_broken_by,
+                ..
+            } = tally(walks);
+            (says, tied, tie_broken_by)
+        };
+        let (walks, order) = (Some(TieBreaker::Walks), Some(TieBreaker::Order));
+        assert_eq!(broken([-4.0, -6.0]), (Some(2), vec![0, 2], walks));
+        assert_eq!(broken([-11.0, -12.0]), (Some(0), vec![0, 2], order));
+        assert_eq!(broken([4.0, 4.0]), (Some(1), vec![], None));
+        assert_eq!(broken([1.0, 2.0]), (None, vec![], None));
     }
 
     #[test]

@@ -7,7 +7,7 @@ use crate::body::Body;
 use crate::config::{Config, DataConfig};
 use crate::data::dataset::Split;
 use crate::images::training::TrainingImages;
-use crate::images::whereabouts::{Whereabouts, load_dataset_of, stimulus_of};
+use crate::images::whereabouts::{Whereabouts, labelled, load_dataset_of};
 use crate::robots;
 use crate::robots::published;
 use crate::robots::selection::Selection;
@@ -228,12 +228,12 @@ pub(crate) fn subject(options: &ReplayOptions) -> Result<ReplaySubject, Error> {
                     }
                     (None, _) => Error::input(format!("training_images: {error}")),
                 })?;
-        let stimulus = stimulus_of(config, &dataset, split, index)?;
-        images.push(LabelledStimulus {
-            class: label,
-            label: ImageRef { index, label }.called(split, dataset.class_names()),
-            stimulus,
-        });
+        images.push(labelled(
+            config,
+            &dataset,
+            split,
+            ImageRef { index, label },
+        )?);
     }
     config.data.dataset = dataset.name().to_string();
     check_length(config, images.len())?;

@@ -2,6 +2,7 @@
 //! voxels help colour-blind viewers tell materials apart.
 
 use crate::body::Material;
+use serde::{Serialize, Serializer};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) struct Colour {
@@ -39,6 +40,13 @@ impl Colour {
     }
 }
 
+impl Serialize for Colour {
+    /// Writes it as `#rrggbb`, as pages need it.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.hex().serialize(serializer)
+    }
+}
+
 /// The sky behind the robot, and the paper behind text.
 pub(crate) const PAPER: Colour = Colour::new(255, 255, 255);
 /// The colour of text and axes.
@@ -53,6 +61,8 @@ pub(crate) const GRID: Colour = Colour::new(228, 231, 236);
 pub(crate) const PEG: Colour = Colour::new(72, 74, 80);
 /// The path of the centre of mass.
 pub(crate) const TRACE: Colour = Colour::new(178, 24, 158);
+/// The frame around the part of an image that a body covers: visible on black and on white.
+pub(crate) const WINDOW: Colour = Colour::new(255, 176, 0);
 /// The lines between voxels where they are opaque.
 pub(crate) const SEAM: Colour = Colour::new(226, 228, 232);
 pub(crate) const ALARM: Colour = Colour::new(190, 20, 40);

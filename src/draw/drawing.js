@@ -64,7 +64,8 @@ const Drawing = (() => {
       if (!ten && scale < 4) continue;
       ctx.lineWidth = ten ? 1.5 : 1;
       ctx.beginPath(); ctx.moveTo(X(zero + m), surface); ctx.lineTo(X(zero + m), surface + (ten ? 9 : 4)); ctx.stroke();
-      if (m % by === 0) ctx.fillText(m === 0 ? "0" : (m < 0 ? "−" : "+") + Math.abs(m), X(zero + m), surface + 13);
+      // A number that would be cut off at the edge is left out.
+      if (m % by === 0 && X(zero + m) > 16 && X(zero + m) < width - 16) ctx.fillText(m === 0 ? "0" : (m < 0 ? "−" : "+") + Math.abs(m), X(zero + m), surface + 13);
     }
     ctx.lineWidth = 1.5; ctx.beginPath(); ctx.moveTo(0, surface); ctx.lineTo(width, surface); ctx.stroke();
   };
@@ -94,6 +95,39 @@ const Drawing = (() => {
       }
       ctx.stroke();
     }
+  };
+
+  // The room that a body takes in the picture. It grows with a body that stretches or jumps, up
+  // to twice its first size: parts that are flung off do not count.
+  class Room {
+    constructor(points, x) {
+      const { left, right, top } = extent(points);
+      this.most = { size: 2 * Math.max(1, right - left), tall: 2 * Math.max(1, top) };
+      this.size = this.most.size / 2; this.tall = this.most.tall / 2;
+      this.take(points, x);
+    }
+
+    // Left and right edge of the body with its centre of mass at `x`; makes room for it.
+    take(points, x) {
+      const { left, right, top } = extent(points), far = this.most.size / 2;
+      const body = { left: Math.max(left, x - far), right: Math.min(right, x + far) };
+      this.size = Math.min(Math.max(this.size, body.right - body.left), this.most.size);
+      this.tall = Math.min(Math.max(this.tall, top), this.most.tall);
+      return body;
+    }
+  }
+
+  // The middle of a picture, `wide` voxel lengths, moved from `middle` as little as keeps a body and a margin in it.
+  const camera = (middle, { left, right }, wide, margin) => {
+    const low = right + margin - wide / 2, high = left - margin + wide / 2;
+    return low > high ? (left + right) / 2 : Math.min(Math.max(middle, low), high);
+  };
+
+  // Left, right and upper edge of some points; null are not known.
+  const extent = (points) => {
+    let left = Infinity, right = -Infinity, top = 0;
+    for (const q of points) if (q) { left = Math.min(left, q[0]); right = Math.max(right, q[0]); top = Math.max(top, q[1]); }
+    return left > right ? { left: 0, right: 0, top } : { left, right, top };
   };
 
   // The way of the centre of mass, and where it is now.
@@ -135,6 +169,25 @@ const Drawing = (() => {
     }
   };
 
+  // The frame around the part of a picture that the sensors see; `margin`: what they do not see at the top, right, bottom and left,
+  // in pixels of the page. Its yellow shows on black as on white.
+  const frame = (ctx, [top, right, bottom, left], [x, y, width, height]) => {
+    ctx.lineWidth = 2; ctx.strokeStyle = "#ffb000";
+    ctx.strokeRect(x + left + 1, y + top + 1, width - left - right - 2, height - top - bottom - 2);
+  };
+
+  // A picture of grey levels 0 to 255, `room` pixels wide at most, with the part that the sensors see framed.
+  const framed = (canvas, room, { height, width, grey, margin }) => {
+    const cell = room / Math.max(height, width), ctx = fit(canvas, cell * width, cell * height), edge = (k) => Math.round(k * cell);
+    canvas.style.width = cell * width + "px";
+    for (let r = 0; r < height; r++) for (let c = 0; c < width; c++) {
+      const v = grey(r, c);
+      ctx.fillStyle = `rgb(${v},${v},${v})`;
+      ctx.fillRect(edge(c), edge(r), edge(c + 1) - edge(c), edge(r + 1) - edge(r));
+    }
+    frame(ctx, margin.map(edge), [0, 0, edge(width), edge(height)]);
+  };
+
   // A material's colours (small, at rest, large) with its mark, for a legend.
   const swatch = ({ tones, mark: lines }, shown = [0, 1, 2]) => {
     const made = document.createElement("span"), middle = shown.indexOf(1);
@@ -158,5 +211,5 @@ const Drawing = (() => {
     return { name, a, side: (labels) => labels.map(name).join(labels.some((label) => given?.[label]) ? ", " : " ") };
   };
 
-  return { classNames, css, element, fit, sidesOf, ruler, robot, voxel, swatch, path, stimulus };
+  return { camera, classNames, css, element, extent, fit, frame, framed, sidesOf, ruler, robot, voxel, swatch, path, stimulus, Room };
 })();

@@ -164,6 +164,10 @@ fn palette(film: &Film, moments: &[Moment]) -> Result<Palette, PictureError> {
         colour::FAINT,
         colour::SEAM,
     ];
+    let mut phases = film.walk().recording().phases.iter();
+    if phases.any(|phase| phase.seen.image.is_some()) {
+        fixed.push(colour::WINDOW);
+    }
     if film.look() == Look::Paper {
         fixed.extend([colour::GRID, colour::PEG]);
     }

@@ -219,7 +219,7 @@ fn moments(walk: &Walk, every: usize, unit: f64) -> (Value, Vec<i16>) {
             .rows()
             .flatten()
             .map(|v| (255.0 * v.clamp(0.0, 1.0)).round() as u8);
-        json!({
+        let mut words = json!({
             "first": first,
             "label": phase.seen.label,
             "class": phase.seen.class,
@@ -228,7 +228,11 @@ fn moments(walk: &Walk, every: usize, unit: f64) -> (Value, Vec<i16>) {
             "height": phase.seen.stimulus.height(),
             "width": phase.seen.stimulus.width(),
             "stimulus": BASE64.encode(stimulus.collect::<Vec<u8>>()),
-        })
+        });
+        if let Some(image) = &phase.seen.image {
+            words["image"] = json!(image);
+        }
+        words
     });
     let body = &recording.body;
     let mut rollout = json!({
@@ -336,7 +340,11 @@ pub(super) fn fill(template: &str, values: &[(&str, &str)]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::Grid;
     use crate::draw::simulated;
+    use crate::task::margins::Margins;
+    use crate::task::recording::FramedImage;
+    use crate::task::stimulus::StimulusParams;
 
     fn embedded(page: &str) -> Value {
         let (_, rest) = page
@@ -422,6 +430,28 @@ mod tests {
                 && page.contains("{{rollout}}&quot; &amp; &lt;")
         );
         assert_eq!(embedded(&page)["robot"], recording.robot.as_str());
+    }
+
+    #[test]
+    fn the_page_has_the_image_of_which_sensors_see_a_part_and_the_margins_of_that_part() {
+        let mut recording = simulated("34/56", 2, 5, true);
+        let margin = Margins {
+            top: 1,
+            right: 2,
+            bottom: 3,
+            left: 4,
+        };
+        recording.phases[1].seen.image = FramedImage::of(
+            &Grid::filled(8, 9, 7),
+            &StimulusParams {
+                margin,
+                ..StimulusParams::default()
+            },
+        );
+        let phases = embedded(&page(&recording, "", &[]).unwrap())["phases"].clone();
+        assert_eq!(phases[0]["image"], Value::Null);
+        let image = json!({ "margin": [1, 2, 3, 4], "pixels": vec![vec![7; 9]; 8] });
+        assert_eq!(phases[1]["image"], image);
     }
 
     #[test]

@@ -51,6 +51,7 @@ pub(crate) fn simulated(
             class: (phase % 2) as u8,
             label,
             stimulus,
+            image: None,
         }
     };
     let images: Vec<LabelledStimulus> = (0..phases).map(image).collect();

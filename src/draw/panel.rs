@@ -8,10 +8,13 @@ use crate::draw::stage::Stage;
 use crate::draw::walk::Walk;
 use crate::draw::{colour, fonts};
 use crate::task::answer;
-use crate::task::recording::LabelledStimulus;
+use crate::task::recording::{FramedImage, LabelledStimulus};
 
 /// The side of the stimulus picture at zoom 1, pixels.
 const STIMULUS: f64 = 84.0;
+/// The largest side of the whole image at zoom 1, pixels, and its distance from the stimulus.
+const WHOLE: f64 = 64.0;
+const BESIDE: f64 = 6.0;
 /// The width of the legend at zoom 1, pixels.
 const LEGEND: f64 = 116.0;
 /// The margin at the picture's edges at zoom 1, pixels.
@@ -34,9 +37,10 @@ pub(crate) fn panel(walk: &Walk, frame: usize, stage: &Stage) -> Vec<Primitive> 
         [f64::from(stage.width), stage.panel],
         colour::PAPER,
     )];
-    let side = stimulus(walk, frame, [MARGIN * z, MARGIN * z], z, &mut out);
+    let left = MARGIN * z + whole(walk, frame, [MARGIN * z, MARGIN * z], z, &mut out);
+    let side = stimulus(walk, frame, [left, MARGIN * z], z, &mut out);
     let (words, mut end) = (
-        MARGIN * z + side[0] + GAP * z,
+        left + side[0] + GAP * z,
         f64::from(stage.width) - MARGIN * z,
     );
     if stage.has_legend {
@@ -86,7 +90,50 @@ pub(crate) fn least_width(walk: &Walk) -> f64 {
         ))
     });
     let words = verdicts.fold(distance.max(small(&time)), f64::max);
-    MARGIN + STIMULUS + GAP + words + GAP + LEGEND + MARGIN
+    let images = recording.phases.iter().flat_map(|phase| &phase.seen.image);
+    let whole = images.map(|image| whole_size(image, 1.0)[1] + BESIDE);
+    MARGIN + whole.fold(0.0, f64::max) + STIMULUS + GAP + words + GAP + LEGEND + MARGIN
+}
+
+/// Returns the height and width of an image, pixels, of which a body covers a part: its pixels are
+/// squares of whole pixels.
+fn whole_size(image: &FramedImage, z: f64) -> [f64; 2] {
+    let sides = [image.pixels.height(), image.pixels.width()].map(|side| side as f64);
+    let cell = WHOLE * z / sides[0].max(sides[1]).max(1.0);
+    let cell = if cell < 1.0 { cell } else { cell.floor() };
+    sides.map(|side| cell * side)
+}
+
+/// Draws the image of which the sensors see a part, with that part framed. Returns the width that
+/// it takes, with the gap behind it; 0 if the sensors see all of the image.
+fn whole(walk: &Walk, frame: usize, [x, y]: [f64; 2], z: f64, out: &mut Vec<Primitive>) -> f64 {
+    let Some(image) = &walk.phase(frame).seen.image else {
+        return 0.0;
+    };
+    let [height, width] = whole_size(image, z);
+    let cell = height / image.pixels.height().max(1) as f64;
+    let place = |row: usize, column: usize| [x + cell * column as f64, y + cell * row as f64];
+    let edge = Primitive::rectangle([x - z, y - z], [x + width + z, y + height + z], colour::INK);
+    out.push(edge);
+    for ((row, column), pixel) in image.pixels.iter() {
+        out.push(Primitive::rectangle(
+            place(row, column),
+            place(row + 1, column + 1),
+            Colour::gray(f64::from(*pixel) / 255.0),
+        ));
+    }
+    let [rows, columns] = image.window();
+    let ([left, top], [right, bottom]) = (place(rows[0], columns[0]), place(rows[1], columns[1]));
+    let line = 2.0 * z;
+    for [a, b] in [
+        [[left, top], [right, top + line]],
+        [[left, bottom - line], [right, bottom]],
+        [[left, top], [left + line, bottom]],
+        [[right - line, top], [right, bottom]],
+    ] {
+        out.push(Primitive::rectangle(a, b, colour::WINDOW));
+    }
+    width + BESIDE * z
 }
 
 /// The words about a moment of a walk that every view shows.
@@ -318,6 +365,11 @@ fn numbers(walk: &Walk, frame: usize, stage: &Stage, out: &mut Vec<Primitive>) {
         let size = SMALL * z;
         let digits = fonts::width(text.trim_start_matches(['+', '−']), size, false);
         let left = at[0] - digits / 2.0 - (fonts::width(&text, size, false) - digits);
+        // A number that would be cut off at the edge is left out.
+        let end = left + fonts::width(&text, size, false);
+        if left < 0.0 || end > f64::from(stage.width) {
+            continue;
+        }
         let at = [left.round(), at[1] + 18.0 * z];
         out.push(Primitive::Text {
             text,
@@ -332,8 +384,12 @@ fn numbers(walk: &Walk, frame: usize, stage: &Stage, out: &mut Vec<Primitive>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::Grid;
     use crate::draw::simulated;
     use crate::task::answer::Readout;
+    use crate::task::margins::Margins;
+    use crate::task::recording::Recording;
+    use crate::task::stimulus::StimulusParams;
 
     #[test]
     fn readouts_count_steps_of_the_phase_and_agree_with_the_displacement() {
@@ -414,6 +470,51 @@ mod tests {
             ["−3.46", "0.00", "+2.00"]
         );
         assert!(signed(-1.0e300).len() < 16 && signed(f64::NAN).len() < 16);
+    }
+
+    #[test]
+    fn the_image_of_which_sensors_see_a_part_is_beside_it_with_that_part_framed() {
+        let mut recording = simulated("3344/5566", 1, 1, false);
+        let width = |recording: &Recording| {
+            let walk = Walk::new(recording).unwrap();
+            (
+                least_width(&walk),
+                whole(&walk, 0, [0.0; 2], 1.0, &mut Vec::new()),
+            )
+        };
+        let (without, none) = width(&recording);
+        let margin = Margins {
+            top: 2,
+            right: 9,
+            bottom: 10,
+            left: 3,
+        };
+        recording.phases[0].seen.image = FramedImage::of(
+            &Grid::filled(28, 28, 200),
+            &StimulusParams {
+                margin,
+                ..StimulusParams::default()
+            },
+        );
+        let (with, taken) = width(&recording);
+        assert_eq!((none, taken), (0.0, 2.0 * 28.0 + BESIDE));
+        assert_eq!(with - without, taken);
+        let walk = Walk::new(&recording).unwrap();
+        let mut out = Vec::new();
+        whole(&walk, 0, [0.0; 2], 1.0, &mut out);
+        let corners = out.iter().filter_map(|primitive| match primitive {
+            Primitive::Quad { corners, fill, .. } if *fill == colour::WINDOW => Some(*corners),
+            _ => None,
+        });
+        let corners: Vec<[f64; 2]> = corners.flatten().collect();
+        let ends = |axis: usize| {
+            let places = corners.iter().map(|corner| corner[axis]);
+            [
+                places.clone().fold(f64::MAX, f64::min),
+                places.fold(0.0, f64::max),
+            ]
+        };
+        assert_eq!((ends(0), ends(1)), ([6.0, 38.0], [4.0, 36.0]));
     }
 
     #[test]

@@ -77,16 +77,17 @@
     return Number(t) === 0 ? "0.00" : (d < 0 ? "−" : "+") + t;
   };
 
-  // What the whole walk needs, and a smooth path for the camera where that does not fit.
-  let low = Infinity, high = -Infinity, top = 0, standing = 1;
-  for (let f = 0; f < N; f++) {
-    low = Math.min(low, origin(f, 0)); high = Math.max(high, origin(f, 0));
-    for (let i = 0; i < P; i++) { const q = point(f, i); if (q) { top = Math.max(top, q[1]); if (f === 0) standing = Math.max(standing, q[1]); } }
-  }
-  top = Math.min(Math.max(top + 1, standing + 1.5), 1.35 * standing + 2);
-  let size = 1, centre0 = origin(0, 0);
-  for (let i = 0; i < P; i++) { const q = point(0, i); if (q) size = Math.max(size, 2 * Math.abs(q[0] - centre0)); }
-  const left = low - size * 0.75 - 1.5, right = high + size * 0.75 + 1.5;
+  // What the whole walk needs, and a smooth path for the camera where that does not fit. Parts that are flung off do not count.
+  const extents = Array.from({ length: N }, (_, f) => {
+    const { left, right, top } = Drawing.extent(Array.from({ length: P }, (_, i) => point(f, i)));
+    return { left, right, top };
+  });
+  const standing = Math.max(1, extents[0].top), size = Math.max(1, extents[0].right - extents[0].left);
+  for (const [f, e] of extents.entries()) { const x = origin(f, 0); e.left = Math.max(e.left, x - size); e.right = Math.min(e.right, x + size); }
+  let low = Infinity, high = -Infinity, top = 0;
+  for (const e of extents) { low = Math.min(low, e.left); high = Math.max(high, e.right); top = Math.max(top, e.top); }
+  top = Math.min(Math.max(top + 1, standing + 1.5), 2 * standing + 2);
+  const left = low - 2.5, right = high + 2.5;
   const path = new Float64Array(N);
   for (let f = 0; f < N;) {
     const [a, b] = rolloutOf(f);
@@ -132,8 +133,7 @@
 
   const drawScene = (ctx, frame, { width, height, surface, scale, follow }) => {
     // The camera never loses a body that is hurled away.
-    const far = 0.3 * width / scale, at = origin(frame, 0);
-    const middle = follow ? Math.min(Math.max(path[frame], at - far), at + far) : (left + right) / 2;
+    const middle = follow ? Drawing.camera(path[frame], extents[frame], width / scale, 1) : (left + right) / 2;
     const x0 = middle - width / 2 / scale;
     const X = (x) => Math.min(Math.max((x - x0) * scale, -9999), 9999);
     const Y = (y) => Math.min(Math.max(surface - y * scale, -9999), 9999);
@@ -150,23 +150,36 @@
 
   const images = phases.map((p) => view(p.stimulus));
   const drawStimulus = () => {
-    const canvas = $("stimulus"), p = phaseOf(frame), { height, width } = phases[p];
+    const canvas = $("stimulus"), p = phaseOf(frame), { height, width, image } = phases[p];
+    $("whole-figure").hidden = !image;
+    if (image) {
+      const { pixels, margin } = image;
+      Drawing.framed($("whole"), $("whole-figure").clientWidth, { height: pixels.length, width: pixels[0].length, grey: (r, c) => pixels[r][c], margin });
+    }
     const grey = (r, c) => images[p].getUint8(r * width + c);
     Drawing.stimulus(canvas, canvas.parentElement.clientWidth, { height, width, grey }, rows, rollout.materials.list);
   };
 
   const gutter = 52;
-  // The image in a corner, its name, and how far the robot has moved.
+  // In a corner the image, if the sensors see a part of it, and what they see; its name, and how far the robot has moved.
   const drawSeen = (ctx, f) => {
-    const p = phaseOf(f), { height, width } = phases[p], side = Math.max(1, Math.round(SEEN / Math.max(height, width)));
-    for (let r = 0; r < height; r++) for (let c = 0; c < width; c++) {
-      const grey = images[p].getUint8(r * width + c);
-      ctx.fillStyle = `rgb(${grey}, ${grey}, ${grey})`; ctx.fillRect(4 + c * side, 4 + r * side, side, side);
-    }
-    ctx.strokeStyle = css("faint"); ctx.lineWidth = 1; ctx.strokeRect(4, 4, width * side, height * side);
+    const p = phaseOf(f), { height, width, image } = phases[p];
+    let x = 4;
+    const picture = (height, width, grey, margin) => {
+      const side = SEEN / Math.max(height, width), edge = (k) => Math.round(k * side);
+      for (let r = 0; r < height; r++) for (let c = 0; c < width; c++) {
+        const v = grey(r, c);
+        ctx.fillStyle = `rgb(${v}, ${v}, ${v})`; ctx.fillRect(x + edge(c), 4 + edge(r), edge(c + 1) - edge(c), edge(r + 1) - edge(r));
+      }
+      ctx.strokeStyle = css("faint"); ctx.lineWidth = 1; ctx.strokeRect(x, 4, edge(width), edge(height));
+      if (margin) Drawing.frame(ctx, margin.map(edge), [x, 4, edge(width), edge(height)]);
+      x += edge(width) + 6;
+    };
+    if (image) picture(image.pixels.length, image.pixels[0].length, (r, c) => image.pixels[r][c], image.margin);
+    picture(height, width, (r, c) => images[p].getUint8(r * width + c));
     ctx.textBaseline = "top"; ctx.textAlign = "left"; ctx.font = "13px system-ui, sans-serif";
-    ctx.fillStyle = css("ink"); ctx.fillText(phases[p].label, width * side + 12, 4);
-    ctx.fillStyle = css("accent"); ctx.fillText(signed(moved(f)), width * side + 12, 22);
+    ctx.fillStyle = css("ink"); ctx.fillText(phases[p].label, x + 2, 4);
+    ctx.fillStyle = css("accent"); ctx.fillText(signed(moved(f)), x + 2, 22);
   };
 
   const drawChart = () => {

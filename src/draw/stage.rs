@@ -14,6 +14,8 @@ const PANEL: f64 = 104.0;
 const GROUND: f64 = 24.0;
 /// The sky left and right of the whole walk, voxel lengths.
 const MARGIN: f64 = 2.5;
+/// The least sky between a body that the camera follows and the edges, voxel lengths.
+const EDGE: f64 = 1.0;
 /// Smallest and largest voxel, pixels at zoom 1. The camera follows walks that need smaller ones.
 const VOXEL: RangeInclusive<f64> = 5.5..=22.0;
 /// The frames before and after over which the camera's path is averaged: a cycle, so that the
@@ -60,7 +62,7 @@ impl Stage {
         let size = (first.right - first.left).clamp(1.0, 128.0);
         let standing = first.top.clamp(1.0, 128.0);
         // Leaves room for hops; a body that is thrown higher leaves the picture for a moment.
-        let top = (all.top + 1.0).clamp(standing + 1.5, 1.35 * standing + 2.0);
+        let top = (all.top + 1.0).clamp(standing + 1.5, 2.0 * standing + 2.0);
         let (left, right) = reach(walk);
         let fixed = f64::from(width) / (right - left + 2.0 * MARGIN);
         let highest = 1.2 * f64::from(width) / top;
@@ -76,7 +78,7 @@ impl Stage {
         let surface = (panel + top * scale).round();
         let height = (surface + GROUND * zoom) as u32;
         let middle = if follow {
-            followed(walk, 0.3 * f64::from(width) / scale)
+            followed(walk, f64::from(width) / scale)
         } else {
             vec![(left + right) / 2.0; walk.frames()]
         };
@@ -156,9 +158,9 @@ fn reach(walk: &Walk) -> (f64, f64) {
 }
 
 /// Returns the camera's x per frame: the centres, averaged twice over [`SMOOTHING`] frames on both
-/// sides, each rollout by itself. It stays within `most` voxel lengths of the centre, which keeps a
-/// body that is hurled away in view.
-fn followed(walk: &Walk, most: f64) -> Vec<f64> {
+/// sides, each rollout by itself. It moves farther where the body would leave a picture `wide`
+/// voxel lengths wide; parts that are flung off do not count.
+fn followed(walk: &Walk, wide: f64) -> Vec<f64> {
     let mut path: Vec<f64> = (0..walk.frames()).map(|f| walk.centre(f)[0]).collect();
     let mut start = 0;
     while start < path.len() {
@@ -168,9 +170,17 @@ fn followed(walk: &Walk, most: f64) -> Vec<f64> {
         }
         start = rollout.end.max(start + 1);
     }
+    let size = walk.recording().body.width() as f64;
     for (f, x) in path.iter_mut().enumerate() {
         let centre = walk.centre(f)[0];
-        *x = x.clamp(centre - most, centre + most);
+        let extent = walk.extent(f..f + 1);
+        let left = extent.left.clamp(centre - size, centre) - EDGE;
+        let right = extent.right.clamp(centre, centre + size) + EDGE;
+        let [low, high] = [right - wide / 2.0, left + wide / 2.0];
+        *x = match low < high {
+            true => x.clamp(low, high),
+            false => (left + right) / 2.0,
+        };
     }
     path
 }
@@ -221,6 +231,11 @@ mod tests {
         for f in 0..walk.frames() {
             let x = stage.to_pixels(f, walk.centre(f))[0];
             assert!((100.0..380.0).contains(&x), "frame {f}: {x}");
+            let (all, window) = (walk.extent(f..f + 1), stage.window(f));
+            assert!(
+                window.left < all.left && all.right < window.right,
+                "frame {f}"
+            );
         }
         let speed = |f: usize| stage.window(f + 1).left - stage.window(f).left;
         assert!((200..800).all(|f| (0.1..0.5).contains(&speed(f))));

@@ -16,6 +16,7 @@ use crate::store::folder::{IfExists, RunFolder};
 use crate::store::images::{DatasetRef, ImageRef};
 use crate::store::names::DATA_FOLDER;
 use crate::task::class_names::ClassNames;
+use crate::task::recording::{FramedImage, LabelledStimulus};
 use crate::task::stimulus::{StimulusParams, stimulus};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -324,6 +325,24 @@ pub fn stimulus_of(
     index: usize,
 ) -> Result<Grid<f64>, Error> {
     stimulus_for(&config.body, &config.stimulus, dataset, split, index)
+}
+
+/// Returns an image as a robot of a config sees it, for pictures.
+pub(crate) fn labelled(
+    config: &Config,
+    dataset: &Dataset,
+    split: Split,
+    image: ImageRef,
+) -> Result<LabelledStimulus, Error> {
+    let pixels = dataset
+        .image(split, image.index)
+        .map_err(|error| Error::input(error.to_string()))?;
+    Ok(LabelledStimulus {
+        class: image.label,
+        label: image.called(split, dataset.class_names()),
+        stimulus: stimulus_of(config, dataset, split, image.index)?,
+        image: FramedImage::of(&pixels, &config.stimulus),
+    })
 }
 
 /// Returns several images as a robot of a config sees them, in their order.

@@ -12,6 +12,7 @@ pub(crate) fn asset(path: &str) -> Option<HttpResponse> {
         // The styles of the page that `replay` writes, and additions.
         "/replay.css" => (CSS, include_str!("../draw/replay.css")),
         "/stages.css" => (CSS, include_str!("../draw/stages.css")),
+        "/cells.css" => (CSS, include_str!("../draw/cells.css")),
         "/page.css" => (CSS, include_str!("page/page.css")),
         "/drawing.js" => (JS, include_str!("../draw/drawing.js")),
         "/stages.js" => (JS, include_str!("../draw/stages.js")),

@@ -4,6 +4,7 @@ use crate::base::error::Error;
 use crate::body::{Body, VoxelCounts};
 use crate::config::Config;
 use crate::data::gates::Gates;
+use crate::draw::plot::cells::CellMap;
 use crate::robots::published;
 use crate::search::held_out_run::task_of;
 use crate::serve::course::Course;
@@ -37,8 +38,8 @@ pub(crate) struct Collection {
     /// The dataset of the run; `None` for published robots.
     pub(crate) dataset: Option<DatasetRef>,
     pub(crate) generations: Option<u64>,
-    /// The bins of the archive's dimensions muscle, sensor and total.
-    pub(crate) bins: Vec<usize>,
+    /// The cells of the archive; `None` if the robots are not those of one archive.
+    pub(crate) map: Option<CellMap>,
     pub(crate) tasks: Vec<String>,
     /// The robots, fittest first.
     pub(crate) robots: Vec<Entry>,
@@ -97,6 +98,8 @@ pub(crate) struct CollectionSummary {
     pub(crate) name: String,
     /// The path of the run.json; `None` if it is built in.
     pub(crate) path: Option<String>,
+    /// True if the user named it when the page was opened: the page begins with the first of them.
+    pub(crate) chosen: bool,
     pub(crate) robots: usize,
     pub(crate) tasks: Vec<String>,
     pub(crate) dataset: String,
@@ -120,6 +123,8 @@ struct Watched {
 #[derive(Clone)]
 struct Known {
     collection: Arc<Collection>,
+    /// True if the user named it.
+    chosen: bool,
     changes: u64,
 }
 
@@ -189,10 +194,10 @@ impl RobotCatalogue {
             looked: None,
         };
         for path in archives {
-            watch.open(path, &mut notes)?;
+            watch.open(path, true, &mut notes)?;
         }
         if let Some(path) = newest
-            && let Err(error) = watch.open(path, &mut notes)
+            && let Err(error) = watch.open(path, false, &mut notes)
         {
             notes.push(format!("{error}; left out"));
         }
@@ -224,25 +229,36 @@ impl RobotCatalogue {
     }
 
     pub(crate) fn list(&self) -> Vec<CollectionSummary> {
-        let short = |(from, asked, changes): (&Collection, Option<u64>, u64)| CollectionSummary {
-            index: 0,
-            name: from.name.clone(),
-            path: from.path.as_ref().map(|path| path.display().to_string()),
-            robots: from.robots.len(),
-            tasks: from.tasks.clone(),
-            dataset: from.config.data.dataset.clone(),
-            generations: from.generations,
-            asked,
-            changes,
-            best: from.robots.first().map(|robot| robot.fitness),
+        let short = |(from, chosen, asked, changes): (&Collection, bool, Option<u64>, u64)| {
+            CollectionSummary {
+                index: 0,
+                name: from.name.clone(),
+                path: from.path.as_ref().map(|path| path.display().to_string()),
+                chosen,
+                robots: from.robots.len(),
+                tasks: from.tasks.clone(),
+                dataset: from.config.data.dataset.clone(),
+                generations: from.generations,
+                asked,
+                changes,
+                best: from.robots.first().map(|robot| robot.fitness),
+            }
         };
         let archives = self.archives();
-        let built_in = self.built_in.iter().map(|from| (&**from, None, 0));
+        let built_in = self.built_in.iter().map(|from| (&**from, false, None, 0));
         let read = archives.iter().map(
             |Known {
                  collection,
+                 chosen,
                  changes,
-             }| { (&**collection, Some(collection.config.generations), *changes) },
+             }| {
+                (
+                    &**collection,
+                    *chosen,
+                    Some(collection.config.generations),
+                    *changes,
+                )
+            },
         );
         let list = built_in.chain(read).map(short).enumerate();
         list.map(|(index, summary)| CollectionSummary { index, ..summary })
@@ -288,17 +304,18 @@ fn real(path: &Path) -> PathBuf {
 }
 
 impl Watch {
-    fn open(&mut self, path: &Path, notes: &mut Vec<String>) -> Result<(), Error> {
+    fn open(&mut self, path: &Path, chosen: bool, notes: &mut Vec<String>) -> Result<(), Error> {
         let stamps = stamps(path);
         let collection = archive(RunFile::read(path)?, path, notes)?;
-        self.add(path, stamps, collection);
+        self.add(path, stamps, collection, chosen);
         Ok(())
     }
 
-    fn add(&mut self, path: &Path, stamps: Stamps, collection: Collection) {
+    fn add(&mut self, path: &Path, stamps: Stamps, collection: Collection, chosen: bool) {
         self.paths.extend([path.to_path_buf(), real(path)]);
         let known = Known {
             collection: Arc::new(collection),
+            chosen,
             changes: 0,
         };
         self.watched.push(Watched {
@@ -326,7 +343,7 @@ impl Watch {
             match read(&path) {
                 Some(Ok(collection)) => {
                     self.unreadable.remove(&path);
-                    self.add(&path, now, collection);
+                    self.add(&path, now, collection, false);
                 }
                 Some(Err(_)) => _ = self.unreadable.insert(path, now),
                 None => {}
@@ -426,7 +443,7 @@ fn published() -> Result<Collection, Error> {
         name: "Published with the paper".to_string(),
         dataset: None,
         generations: None,
-        bins: Vec::new(),
+        map: None,
         ..all
     })
 }
@@ -451,7 +468,7 @@ fn trained(set: &str, name: &str) -> Result<Collection, Error> {
         name,
         generations: None,
         dataset: None,
-        bins: Vec::new(),
+        map: None,
         tasks,
         robots,
         ..first
@@ -495,11 +512,13 @@ fn of_run(run: RunFile, audit: Option<&AuditFile>) -> Result<Collection, Error> 
     };
     let mut robots: Vec<Entry> = run.elites.iter().map(entry).collect();
     fittest_first(&mut robots);
+    // A training has one robot, and no archive.
+    let map = run.origin.is_none().then(|| CellMap::of(&run));
     Ok(Collection {
         name: format!("{}, seed {}", run.name, run.config.seed),
         path: None,
         generations: Some(run.generations),
-        bins: run.dimensions.bins.iter().take(3).copied().collect(),
+        map,
         tasks: run.dimensions.tasks.clone(),
         dataset: Some(run.dataset),
         config: run.config,

@@ -8,6 +8,7 @@ use crate::serve::refusal::HttpRefusal;
 use crate::sim::Physics;
 use crate::task::class_names::ClassNames;
 use crate::task::protocol::Protocol;
+use crate::task::recording::FramedImage;
 use crate::task::stimulus::{Encoding, Reduction, StimulusParams, stimulus};
 use serde::Deserialize;
 
@@ -99,6 +100,8 @@ pub(crate) struct SeenPixels {
     pub(crate) stimulus: Grid<f64>,
     /// The class of a test image.
     pub(crate) label: Option<u8>,
+    /// The image that it is a part of, if the sensors do not cover all of it.
+    pub(crate) image: Option<FramedImage>,
 }
 
 #[derive(Clone, Debug)]
@@ -168,6 +171,7 @@ impl ImageChoice {
             } => Ok(SeenPixels {
                 stimulus: Grid::filled(height, width, 0.0),
                 label: None,
+                image: None,
             }),
             ImageChoice {
                 drawing: Some(pixels),
@@ -183,6 +187,7 @@ impl ImageChoice {
                 Ok(SeenPixels {
                     stimulus: reduce(&pixels)?,
                     label: None,
+                    image: FramedImage::of(&pixels, &who.encoding),
                 })
             }
             ImageChoice {
@@ -194,6 +199,7 @@ impl ImageChoice {
                 Ok(SeenPixels {
                     stimulus: reduce(&image.pixels)?,
                     label: Some(image.label),
+                    image: FramedImage::of(&image.pixels, &who.encoding),
                 })
             }
             ImageChoice {
@@ -219,6 +225,7 @@ impl ImageChoice {
                 Ok(SeenPixels {
                     stimulus: given,
                     label: None,
+                    image: None,
                 })
             }
             _ => Err(HttpRefusal::Wrong(

@@ -6,6 +6,7 @@ use crate::serve::assets::asset;
 use crate::serve::http::{HttpResponse, Request};
 use crate::serve::refusal::HttpRefusal;
 use crate::serve::request::{ChangeRequest, Pace, RolloutPlan, SeeRequest, SimulationRequest};
+use crate::serve::stream::seen_pixels;
 use crate::serve::team::{TeamPlan, TeamRequest};
 use crate::serve::{Service, request, team};
 use serde::Deserialize;
@@ -63,9 +64,7 @@ pub(crate) fn reply(service: &Service, request: &Request) -> Reply {
         ["api", "stimulus"] => posting(&|| {
             let asked: SeeRequest = request::read(&request.body)?;
             let seen = asked.seen(&service.catalogue, &service.images)?;
-            Ok(HttpResponse::json(
-                &json!({ "stimulus": seen.stimulus, "label": seen.label }),
-            ))
+            Ok(HttpResponse::json(&seen_pixels(&seen)))
         }),
         ["api", "scenario"] => posting(&|| {
             let text = std::str::from_utf8(&request.body);
@@ -128,7 +127,7 @@ fn archive(service: &Service, index: &str) -> Result<HttpResponse, HttpRefusal> 
     let collection = service.catalogue.collection(number(index, "archive")?)?;
     let mut words = json!({
         "name": collection.name,
-        "bins": collection.bins,
+        "map": collection.map,
         "tasks": collection.tasks,
         "control_steps": collection.config.protocol.control_steps,
         "dataset": collection.config.data.dataset,

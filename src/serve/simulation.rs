@@ -226,6 +226,7 @@ mod tests {
         let seen = SeenPixels {
             stimulus: Grid::filled(2, 4, 0.0),
             label: None,
+            image: None,
         };
         let plan = RolloutPlan {
             who: who.clone(),

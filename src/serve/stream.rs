@@ -116,7 +116,19 @@ fn begin(id: u64, plan: &RolloutPlan, voxels: &[VoxelCorners], frame: &Frame) ->
 }
 
 fn looks(step: u32, until: u32, seen: &SeenPixels) -> Value {
-    json!({ "step": step, "until": until, "label": seen.label, "stimulus": seen.stimulus })
+    let mut words = seen_pixels(seen);
+    words["step"] = step.into();
+    words["until"] = until.into();
+    words
+}
+
+/// Describes a stimulus and, if the sensors cover only a part of it, its image.
+pub(crate) fn seen_pixels(seen: &SeenPixels) -> Value {
+    let mut words = json!({ "label": seen.label, "stimulus": seen.stimulus });
+    if let Some(image) = &seen.image {
+        words["image"] = json!(image);
+    }
+    words
 }
 
 /// Encodes moments: the origin [x, y] as 64-bit floats, then 16-bit pairs per point; little-endian.

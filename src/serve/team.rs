@@ -326,6 +326,7 @@ mod tests {
             let seen = SeenPixels {
                 stimulus: Grid::filled(who.body.height(), who.body.width(), 1.0),
                 label: Some(1),
+                image: None,
             };
             (
                 Name {

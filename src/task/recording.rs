@@ -4,6 +4,50 @@ use crate::base::Grid;
 use crate::body::Body;
 use crate::task::answer::Readout;
 use crate::task::class_names::ClassNames;
+use crate::task::margins::Margins;
+use crate::task::stimulus::StimulusParams;
+use serde::{Serialize, Serializer};
+
+/// An image of which a body covers a part: pictures frame that part in it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct FramedImage {
+    /// The whole image, 0 paper … 255 ink.
+    pub(crate) pixels: Grid<u8>,
+    /// The rows and columns that the body does not cover: top, right, bottom, left.
+    #[serde(serialize_with = "serialize_sides")]
+    pub(crate) margin: Margins,
+}
+
+impl FramedImage {
+    /// Returns the image for bodies with these parameters; `None` if they cover all of it, where
+    /// the stimulus is a picture of the image already.
+    pub(crate) fn of(pixels: &Grid<u8>, params: &StimulusParams) -> Option<Self> {
+        let margin = params.margin;
+        (!margin.is_none()).then(|| FramedImage {
+            pixels: pixels.clone(),
+            margin,
+        })
+    }
+
+    /// Returns the covered rows and columns: the first of each, and the first behind them.
+    pub(crate) fn window(&self) -> [[usize; 2]; 2] {
+        let Margins {
+            top,
+            right,
+            bottom,
+            left,
+        } = self.margin;
+        [
+            [top, self.pixels.height().saturating_sub(bottom)],
+            [left, self.pixels.width().saturating_sub(right)],
+        ]
+    }
+}
+
+/// Writes margins always as top, right, bottom, left.
+fn serialize_sides<S: Serializer>(margin: &Margins, serializer: S) -> Result<S::Ok, S::Error> {
+    [margin.top, margin.right, margin.bottom, margin.left].serialize(serializer)
+}
 
 /// An image and its stimulus.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,6 +58,8 @@ pub struct LabelledStimulus {
     pub label: String,
     /// Stimulus of the sensors: H × W in [0, 1].
     pub stimulus: Grid<f64>,
+    /// The image that it is a part of, if the sensors do not cover all of it.
+    pub image: Option<FramedImage>,
 }
 
 /// One part of a recording, under one stimulus.

@@ -370,6 +370,7 @@ mod tests {
             class,
             label: label.to_string(),
             stimulus,
+            image: None,
         };
         let images = [
             seen(0, "dark", image(0.0, 0.0)),

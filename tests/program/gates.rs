@@ -154,9 +154,12 @@ fn all_four_inputs_are_shown_side_by_side() {
              --set protocol.rollout=\"sequential\"",
         )
         .ended(0, &[]);
-    sandbox
-        .run("replay -a gallery:gates -f html --side-by-side")
-        .ended(2, &["side-by-side", "GIF and PNG"]);
+    // Refused before the run is even looked for.
+    for pictures in ["-f html", "-f terminal", "-o page.html"] {
+        sandbox
+            .run(&format!("replay -a none.json {pictures} --side-by-side"))
+            .ended(2, &["side-by-side", "GIF and PNG"]);
+    }
     sandbox
         .run("replay -a gallery:gates -f png --side-by-side --width 4000")
         .ended(2, &["width", "4096"]);

@@ -174,7 +174,7 @@ fn a_figure_that_is_too_long_for_print_has_fewer_pixels_and_nothing_is_written_b
         .ended(0, &[]);
     sandbox
         .run("plot archive -a run")
-        .ended(0, &["note: run/plot-archive.png: 6"]);
+        .ended(0, &["note: run/plot-archive.png: 4"]);
     assert_eq!(sandbox.read("run/plot-archive.svg"), sandbox.read("a.svg"));
     let [_, height] = png_size(&std::fs::read(sandbox.path("run/plot-archive.png")).unwrap());
     assert!((15_000..=16_000).contains(&height), "{height}");

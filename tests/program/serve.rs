@@ -774,6 +774,7 @@ fn a_simulation_is_what_the_engine_computes() {
         class: 0,
         label: "drawing".to_string(),
         stimulus: seen.clone(),
+        image: None,
     }];
     let expected = record(
         "QMAXD",

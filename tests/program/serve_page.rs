@@ -109,6 +109,14 @@ fn a_drawn_zero_and_a_drawn_one_are_told_apart_and_the_page_fits_everywhere() {
     open(&mut tab, &server);
     // It begins with the best of the trained robots; the published ones are a choice away.
     assert_eq!(tab.text("#who"), best());
+    // That one knows two digits, and says so.
+    assert_eq!(
+        (tab.text("#invites"), tab.text("#knows")),
+        (
+            "Draw a 0 or a 1. For all ten digits: Team".to_string(),
+            "it knows only 0 and 1".to_string()
+        )
+    );
     choose(&mut tab, "1");
     assert_eq!(tab.text("#who"), "QMAXD");
     as_fast_as_possible(&mut tab);
@@ -151,6 +159,9 @@ fn a_drawn_zero_and_a_drawn_one_are_told_apart_and_the_page_fits_everywhere() {
     tab.wait("document.getElementById('checked').dataset.state === 'good'");
     tab.click("#live");
     assert_eq!(tab.text("#who"), "Your body");
+    let invites = tab.text("#invites");
+    assert!(invites.contains("has no task"), "{invites}");
+    assert_eq!(tab.text("#knows"), "");
     tab.click("#empty");
     tab.wait("document.getElementById('checked').dataset.state === 'bad' && document.getElementById('live').disabled");
     tab.click("#unpaint");
@@ -249,6 +260,66 @@ fn digits_drawn_in_any_size_place_and_slant_are_read_by_the_robot_that_the_page_
         wrong.len(),
         wrong.join("\n")
     );
+}
+
+/// True if an element is in sight, whole.
+fn is_in_sight(tab: &mut Tab, id: &str, height: f64) -> bool {
+    let place = tab.eval(&format!(
+        "(({{ top, bottom }}) => [top, bottom])(document.getElementById('{id}').getBoundingClientRect())"
+    ));
+    let [top, bottom]: [f64; 2] = serde_json::from_value(place).unwrap();
+    0.0 <= top && top < bottom && bottom <= height
+}
+
+#[test]
+fn pad_answer_and_what_the_body_knows_are_in_sight_together_on_a_phone_and_on_a_desk() {
+    let sandbox = Sandbox::new();
+    let Some(mut browser) = browser(&sandbox) else {
+        return;
+    };
+    let server = Server::start(&sandbox, "");
+    for (width, height) in [(390, 844), (1280, 800)] {
+        let mut tab = browser.tab(width, height, false);
+        open(&mut tab, &server);
+        as_fast_as_possible(&mut tab);
+        answer(&mut tab, &zero());
+        tab.eval("window.scrollTo(0, 0)");
+        for id in ["says", "knows", "invites", "pad", "world"] {
+            assert!(
+                is_in_sight(&mut tab, id, f64::from(height)),
+                "{width}: {id}"
+            );
+        }
+        // The part of the drawing that the sensors see is framed in it.
+        assert_eq!(tab.eval("document.getElementById('whole').hidden"), false);
+        keep_picture(&format!("serve-together-{width}.png"), &tab.screenshot());
+        tab.click("#invites a");
+        assert_eq!(tab.text("#who"), "The team");
+        at_end(&mut tab);
+        tab.eval("window.scrollTo(0, 0)");
+        for id in ["says", "pad"] {
+            assert!(
+                is_in_sight(&mut tab, id, f64::from(height)),
+                "{width}: {id}"
+            );
+        }
+        assert_eq!(tab.text("#invites"), "Draw any digit from 0 to 9.");
+        // No body touches the edge of its stage: the world is gray, and voxels are not.
+        let cut = "[...document.querySelectorAll('#stages canvas')].filter((canvas) => {
+            const { width, height } = canvas, edge = (...box) => [...canvas.getContext('2d').getImageData(...box).data];
+            const all = [edge(0, 0, 1, height), edge(width - 1, 0, 1, height), edge(0, 0, width, 1)].flat();
+            return all.some((_, k) => k % 4 === 0 && Math.max(...all.slice(k, k + 3)) - Math.min(...all.slice(k, k + 3)) > 60);
+        }).length";
+        assert_eq!(tab.eval(cut), 0);
+        let tie =
+            "Stages.said({ says: 8, tied: [5, 8], tie_broken_by: 'walks' }, Drawing.classNames())";
+        assert_eq!(
+            tab.eval(tie),
+            serde_json::json!({ "says": "5 or 8", "tie": "a tie; the longer walks decide for 8" })
+        );
+        assert_eq!(tab.complaints(), Vec::<String>::new());
+        tab.close();
+    }
 }
 
 #[test]
@@ -402,13 +473,14 @@ fn below_the_prefix_of_a_proxy_and_by_a_name_that_is_allowed_all_of_the_page_wor
     ));
     tab.wait("document.documentElement?.dataset.ready === 'yes'");
     as_fast_as_possible(&mut tab);
+    choose(&mut tab, "0");
     let (says, _) = answer(&mut tab, &zero());
     assert_eq!(says, "0");
     // What the pad is seen as, a change while it walks, test images, curves, team and editor.
     tab.click("#tab-test");
     tab.click("#thumbs button");
     at_end(&mut tab);
-    choose(&mut tab, "4");
+    choose(&mut tab, "5");
     tab.wait("document.querySelectorAll('#curves svg').length === 3");
     tab.click("#tab-team");
     tab.wait("document.querySelectorAll('#stages figure').length === 2");
@@ -453,7 +525,17 @@ fn an_audit_that_appears_while_the_page_is_open_is_said_and_can_be_chosen_by() {
     let server = Server::start(&sandbox, "--archive run");
     let mut tab = browser.tab(1280, 900, false);
     open(&mut tab, &server);
-    choose(&mut tab, "4");
+    // The page begins with the archive that was named, and all its robots are on its map.
+    assert_eq!(tab.eval("document.getElementById('archive').value"), "4");
+    let elites = sandbox.run_file("run").elites.len();
+    tab.wait(&format!(
+        "document.querySelectorAll('#map button').length === {elites}"
+    ));
+    let possible = sandbox.run_file("run").dimensions.possible_cells;
+    assert_eq!(
+        tab.eval("document.querySelectorAll('#map .cells > :is(button, .empty)').length"),
+        possible
+    );
     let begun =
         || serde_json::from_str::<Value>(&server.get("/api/status").body).unwrap()["begun"].clone();
     let (who, before) = (tab.text("#who"), begun());
@@ -658,6 +740,8 @@ fn cues_are_switched_while_the_body_walks_and_digits_come_back_with_their_robots
     }
     // The same walk went on.
     assert!(step(&mut tab).as_f64().unwrap() >= before);
+    let invites = tab.text("#invites");
+    assert!(invites.contains("of cues, not of drawings"), "{invites}");
     keep_picture("serve-gates.png", &tab.screenshot());
     choose(&mut tab, "0");
     tab.wait("document.getElementById('cues').hidden");

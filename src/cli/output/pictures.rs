@@ -146,6 +146,25 @@ impl PicturesWanted {
     }
 }
 
+impl PicturesWanted {
+    /// Returns the formats of the pictures.
+    pub(crate) fn formats(&self) -> Vec<Format> {
+        self.files.iter().map(|(format, _)| *format).collect()
+    }
+}
+
+/// Checks that one of some formats (none: the default ones) can show rollouts side by side.
+pub(crate) fn check_side_by_side(formats: &[Format]) -> Result<(), Error> {
+    let can = |format: &Format| matches!(format, Format::Gif | Format::Png);
+    match or_default(formats).iter().any(can) {
+        true => Ok(()),
+        false => {
+            let text = "it is for GIF and PNG; the page has a button for it";
+            Err(Error::usage(text.to_string()).about("side_by_side"))
+        }
+    }
+}
+
 /// Returns the default folder of a robot's pictures: that of its run.json, or, for a named run,
 /// the present one.
 pub(crate) fn folder(archive: &Path) -> PathBuf {
@@ -197,11 +216,6 @@ pub(crate) fn write(
         PictureError::OneRollout => Error::usage(error.to_string()).about("side_by_side"),
         error => error.into(),
     };
-    let is_picture = |(format, _): &(Format, PathBuf)| matches!(format, Format::Gif | Format::Png);
-    if wanted.side_by_side && !wanted.files.iter().any(is_picture) {
-        let text = "it is for GIF and PNG; the page has a button for it";
-        return Err(Error::usage(text.to_string()).about("side_by_side"));
-    }
     let mut made = Vec::new();
     let recording = &replay.recording;
     let title = format!("morphcog: robot {}", recording.robot);

@@ -1,13 +1,18 @@
 //! Renders a frame of a recording as text, for a live view in a terminal.
 
+use crate::base::Grid;
 use crate::body::Material;
 use crate::draw::colour;
 use crate::draw::colour::Colour;
 use crate::draw::panel::readout;
 use crate::draw::walk::{Walk, area};
+use crate::task::recording::FramedImage;
 
 /// The minimum width, columns, of a view with the stimulus in a corner.
 const WIDE: usize = 40;
+
+/// The largest side of the whole image in the other corner, pixels.
+const WHOLE: usize = 16;
 
 /// The content of one pixel of the view.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,6 +23,8 @@ enum Pixel {
     Mark,
     Voxel(Material, f64),
     Image(f64),
+    /// The frame around the part of the image that the sensors see.
+    Window,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -182,7 +189,51 @@ fn pixels(walk: &Walk, frame: usize, columns: usize, rows: usize, tall: f64) -> 
             out[row * columns + column] = Pixel::Image(*intensity);
         }
     }
+    if let Some(image) = &walk.phase(frame).seen.image {
+        let whole = whole(image);
+        if columns >= WIDE && 4 * whole.width() < columns && whole.height() < surface && tall == 1.0
+        {
+            let left = columns - whole.width();
+            for ((row, column), pixel) in whole.iter() {
+                out[row * columns + left + column] = *pixel;
+            }
+        }
+    }
     out
+}
+
+/// Returns an image of which the sensors see a part, at most [`WHOLE`] pixels wide and high, with
+/// that part framed.
+fn whole(image: &FramedImage) -> Grid<Pixel> {
+    let pixels = &image.pixels;
+    let step = pixels.height().max(pixels.width()).div_ceil(WHOLE).max(1);
+    let [rows, columns] = image.window();
+    let mean = |row: usize, column: usize| {
+        let rows = step * row..(step * (row + 1)).min(pixels.height());
+        let columns = step * column..(step * (column + 1)).min(pixels.width());
+        let count = rows.len() * columns.len();
+        let all = rows.flat_map(|row| columns.clone().map(move |column| (row, column)));
+        let sum: f64 = all.map(|place| f64::from(pixels[place])).sum();
+        Pixel::Image(sum / (255.0 * count.max(1) as f64))
+    };
+    let ends = |[first, end]: [usize; 2]| [first / step, end.saturating_sub(1) / step];
+    let ([top, bottom], [left, right]) = (ends(rows), ends(columns));
+    let is_edge = |row: usize, column: usize| {
+        let (across, up) = (
+            (left..=right).contains(&column),
+            (top..=bottom).contains(&row),
+        );
+        across && (row == top || row == bottom) || up && (column == left || column == right)
+    };
+    let side = |side: usize| side.div_ceil(step);
+    Grid::from_fn(
+        side(pixels.height()),
+        side(pixels.width()),
+        |row, column| match is_edge(row, column) {
+            true => Pixel::Window,
+            false => mean(row, column),
+        },
+    )
 }
 
 /// Returns true if a quadrilateral contains a point: an odd number of its sides are to the right.
@@ -201,6 +252,7 @@ fn paint(pixel: Pixel) -> Colour {
         Pixel::Mark => colour::GROUND_LINE,
         Pixel::Voxel(material, area) => colour::shade(material, area),
         Pixel::Image(intensity) => Colour::gray(intensity),
+        Pixel::Window => colour::WINDOW,
     }
 }
 
@@ -222,6 +274,7 @@ fn letter(pixel: Pixel) -> char {
                 '.'
             }
         }
+        Pixel::Window => '*',
     }
 }
 
@@ -229,6 +282,9 @@ fn letter(pixel: Pixel) -> char {
 mod tests {
     use super::*;
     use crate::draw::simulated;
+    use crate::task::margins::Margins;
+    use crate::task::recording::Recording;
+    use crate::task::stimulus::StimulusParams;
 
     /// Counts the visible characters of every line.
     fn visible(text: &str) -> Vec<usize> {
@@ -276,6 +332,42 @@ mod tests {
             [200, 36, 58],
         ];
         assert_eq!(colours.map(indexed), [16, 231, 196, 243, 161]);
+    }
+
+    #[test]
+    fn the_whole_image_is_in_the_other_corner_with_the_part_framed_that_the_sensors_see() {
+        let mut recording = simulated("3344/1256", 1, 5, true);
+        let [red, green, blue] = colour::WINDOW.rgb;
+        let seen = |recording: &Recording| {
+            let walk = Walk::new(recording).unwrap();
+            frame(&walk, 0, 80, 24, Depth::Full).contains(&format!("{red};{green};{blue}"))
+        };
+        assert!(!seen(&recording));
+        let params = StimulusParams {
+            margin: Margins {
+                top: 8,
+                right: 2,
+                bottom: 4,
+                left: 20,
+            },
+            ..StimulusParams::default()
+        };
+        let image = FramedImage::of(&Grid::filled(28, 28, 51), &params).unwrap();
+        let small = whole(&image);
+        let line =
+            |row: usize| -> String { (0..14).map(|column| letter(small[(row, column)])).collect() };
+        assert_eq!(
+            [3, 4, 5, 11, 12].map(line),
+            [
+                "..............",
+                "..........***.",
+                "..........*.*.",
+                "..........***.",
+                ".............."
+            ]
+        );
+        recording.phases[0].seen.image = Some(image);
+        assert!(seen(&recording));
     }
 
     #[test]

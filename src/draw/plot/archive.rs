@@ -1,32 +1,35 @@
 //! The figure of an archive: fitness over muscle, sensor and total voxels.
-//!
-//! A map has a square for every pair of muscle and sensor bins, divided into strips by the bin of
-//! the total. Cells that could hold an elite are framed; impossible ones stay blank.
 
+use crate::base::number;
 use crate::body::Material;
-use crate::draw::colour;
 use crate::draw::colour::Colour;
 use crate::draw::plot::axes::{Axis, MARGIN, colour_bar, heading};
 use crate::draw::plot::canvas::{Canvas, Pen, Piece, TEXT, TextStyle};
+use crate::draw::plot::cells::{Cell, CellMap, Panel, TaskMap, colour as colour_of};
 use crate::draw::plot::figure::{COLUMN, Figure, PAGE};
-use crate::draw::plot::svg::number;
 use crate::draw::plot::{robot, scales};
-use crate::qd::descriptor::{COUNT_BINS, DescriptorSpace, count_bin, possible_cells};
+use crate::draw::{colour, fonts};
 use crate::store::run::RunFile;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
-/// Space to the left of and below a map, points.
-const LEFT: f64 = 30.0;
-const BELOW: f64 = 24.0;
-/// Caption of the strips.
-const STRIPS: [&str; 2] = ["strips in a square:", "total voxels, few to many"];
+/// Gap between panels, points, and the space for the axes of the last one.
+const GAP: f64 = 5.0;
+const LEFT: f64 = 27.0;
+const BELOW: f64 = 21.0;
+/// Space above a panel for the number of voxels, points.
+const ABOVE: f64 = 9.5;
+/// Space above a map for the name of its task, points.
+const NAME: f64 = 11.0;
+/// Smallest and largest side of a cell, points.
+const SIDES: [f64; 2] = [3.0, 9.5];
+/// Width and height of the legend beside the panels, points.
+const LEGEND: [f64; 2] = [80.0, 76.0];
 
-/// Plots the fitness of the elites of a run, one map per task.
+/// Plots the fitness of the elites of a run: a map per task, with a panel per bin of total voxels.
 pub fn archive(run: &RunFile) -> Figure {
-    let tasks = run.dimensions.tasks.len().max(1);
-    let scale = Scale::of(run);
-    let mut canvas = Canvas::new();
-    let (columns, width) = if tasks == 1 { (1, COLUMN) } else { (4, PAGE) };
+    let map = CellMap::of(run);
+    let is_single = map.tasks.len() == 1;
+    let (columns, width) = if is_single { (1, COLUMN) } else { (2, PAGE) };
     let of = format!(
         "{}, seed {}, generation {}; {} of {} cells",
         run.name,
@@ -35,166 +38,207 @@ pub fn archive(run: &RunFile) -> Figure {
         run.stats.num_elites,
         run.dimensions.possible_cells
     );
-    let top = heading(&mut canvas, "Fitness of the elites", &of, width);
-    let side = (width - 2.0 * MARGIN) / columns as f64 - LEFT - 4.0;
-    let title = if tasks == 1 { 2.0 } else { 14.0 };
-    let map_height = title + side + BELOW;
-    let space = DescriptorSpace::voxel_counts(tasks);
-    let possible: BTreeSet<Vec<usize>> = possible_cells(
-        run.config.body.height * run.config.body.width,
-        run.config.body.min_muscles,
-        tasks,
-    )
-    .into_iter()
-    .filter_map(|index| space.coordinates(index))
-    .collect();
-    let elites: BTreeMap<Vec<usize>, f64> = run
-        .elites
-        .iter()
-        .map(|robot| (robot.cell.clone(), robot.objective))
-        .collect();
-    for task in 0..tasks {
-        let (row, column) = (task / columns, task % columns);
-        let x = MARGIN + LEFT + column as f64 * (side + LEFT + 4.0);
-        let y = top + title + row as f64 * (map_height + 4.0);
-        if tasks > 1 {
-            canvas.fitted(
-                [x, y - 4.0],
-                &run.dimensions.tasks[task],
-                side,
-                TextStyle::default().bold(),
-            );
-        }
-        let cell = |bins: [usize; 3]| {
-            let mut cell = bins.to_vec();
-            cell.extend((tasks > 1).then_some(task));
-            possible.contains(&cell).then(|| elites.get(&cell).copied())
-        };
-        let is_first = column == 0;
-        map(&mut canvas, [x, y], side, &cell, &scale);
-        axes(&mut canvas, [x, y], side, run, is_first);
-    }
-    let rows = tasks.div_ceil(columns);
-    let maps = top + rows as f64 * (map_height + 4.0);
-    let height = if tasks == 1 {
-        // A map's upper right half is empty: more muscles and sensors than voxels.
-        legend(
-            &mut canvas,
-            [MARGIN + LEFT + 0.53 * side, top + 0.01 * side],
-            0.44 * side,
-            &scale,
-            true,
-        );
-        canvas.text(
-            [width / 2.0, maps + 3.0],
-            &STRIPS.join(" "),
-            TextStyle::middle().colour(colour::FAINT),
-        );
-        maps + 4.0
-    } else if !tasks.is_multiple_of(columns) {
-        let free = MARGIN + LEFT + (tasks % columns) as f64 * (side + LEFT + 4.0);
-        legend(
-            &mut canvas,
-            [free, maps - map_height + 20.0],
-            side,
-            &scale,
-            false,
-        );
-        maps
-    } else {
-        legend(
-            &mut canvas,
-            [MARGIN + LEFT, maps + 12.0],
-            side,
-            &scale,
-            false,
-        );
-        maps + 78.0
+    let mut canvas = Canvas::new();
+    let top = heading(&mut canvas, "Fitness of the elites", &of, width) + 2.0;
+    let room = (width - 2.0 * MARGIN + GAP) / columns as f64 - GAP;
+    // A single map leaves room for the legend beside its last panels.
+    let lines = if is_single { 2 } else { 1 };
+    let layout = Layout::new(&map.tasks[0].panels, room, lines);
+    let above = if is_single { 0.0 } else { NAME };
+    let pitch = above + layout.height + 4.0;
+    let place = |number: usize| {
+        let (row, column) = (number / columns, number % columns);
+        [
+            MARGIN + column as f64 * (room + GAP),
+            top + row as f64 * pitch,
+        ]
     };
+    for (number, task) in map.tasks.iter().enumerate() {
+        let [x, y] = place(number);
+        if !is_single {
+            let scale = match task.has_own_scale {
+                true => format!(
+                    ", a scale of its own: 0 to {}",
+                    number::fixed(task.highest, 1)
+                ),
+                false => String::new(),
+            };
+            let name = format!("{}{scale}", task.name);
+            canvas.fitted([x, y + TEXT], &name, room, TextStyle::default().bold());
+        }
+        layout.draw(&mut canvas, [x, y + above], task, &map);
+    }
+    let below = top + map.tasks.len().div_ceil(columns) as f64 * pitch;
+    let (at, height) = if is_single {
+        let [x, y] = layout.free;
+        ([MARGIN + x, top + y], below.max(top + y + LEGEND[1]))
+    } else if map.tasks.len().is_multiple_of(columns) {
+        ([MARGIN + GAP, below + 6.0], below + LEGEND[1])
+    } else {
+        let [x, y] = place(map.tasks.len());
+        ([x + GAP, y + above + 6.0], below.max(y + above + LEGEND[1]))
+    };
+    legend(&mut canvas, at, &map);
     Figure::new(&format!("Archive: {of}"), [width, height + MARGIN], canvas)
 }
 
-/// Maps fitness to colour: walkers that are right on the training images are coloured, others gray.
-struct Scale {
-    right: Axis,
-    /// Lowest fitness, if some elite is below zero.
-    lowest: Option<f64>,
-    /// True if a possible cell has no elite.
-    is_open: bool,
-    /// The unit of fitness.
-    unit: Option<&'static str>,
+/// The places of a task's panels: in lines from left to right, each line on a common ground.
+struct Layout {
+    /// Side of a cell, points.
+    cell: f64,
+    /// Left lower corners of the panels, points from the map's left upper corner.
+    corners: Vec<[f64; 2]>,
+    height: f64,
+    /// Left upper corner of the free space behind the last panel.
+    free: [f64; 2],
 }
 
-impl Scale {
-    fn of(run: &RunFile) -> Self {
-        let objectives = || run.elites.iter().map(|robot| robot.objective);
-        let highest = objectives().fold(0.0, f64::max);
-        let lowest = objectives().fold(0.0, f64::min);
-        let highest = if highest > 0.0 { highest } else { 1.0 };
-        Scale {
-            right: Axis::nice(0.0, highest, 4),
-            lowest: (lowest < 0.0).then_some(lowest),
-            is_open: run.elites.len() < run.dimensions.possible_cells,
-            unit: run.fitness().unit(),
+impl Layout {
+    /// Lays panels out in at most so many lines, with cells as large as possible; in more lines
+    /// where the smallest ones do not fit.
+    fn new(panels: &[Panel], room: f64, lines: usize) -> Self {
+        let [least, most] = SIDES;
+        let mut cell = most;
+        loop {
+            let (layout, count) = Layout::with_cells(panels, room, cell);
+            let fits = lines == 1 || layout.free[0] + LEGEND[0] <= room;
+            if (count <= lines && fits) || cell <= least {
+                return layout;
+            }
+            cell -= 0.1;
         }
     }
 
-    fn colour(&self, fitness: f64) -> Colour {
-        match self.lowest {
-            Some(lowest) if fitness < 0.0 => scales::below(1.0 - fitness / lowest),
-            _ => scales::sequential(self.right.share(fitness)),
+    /// Lays panels out with cells of a side. Also returns the number of lines.
+    fn with_cells(panels: &[Panel], room: f64, cell: f64) -> (Self, usize) {
+        let (mut corners, mut line, mut x, mut y) = (Vec::new(), Vec::new(), 0.0, 0.0);
+        let (mut count, mut highest) = (1, 0.0f64);
+        for (number, panel) in panels.iter().enumerate() {
+            // The last panel has the axes.
+            let before = if number + 1 == panels.len() {
+                LEFT
+            } else {
+                0.0
+            };
+            let wide = cell * panel.columns() as f64;
+            let needed = before + wide.max(fonts::width(&panel.total(), TEXT, false));
+            if x > 0.0 && x + needed > room {
+                y += ABOVE + highest + GAP;
+                corners.extend(line.drain(..).map(|x| [x, y - GAP]));
+                (x, highest, count) = (0.0, 0.0, count + 1);
+            }
+            line.push(x + before);
+            x += needed + GAP;
+            highest = highest.max(cell * panel.rows.len() as f64);
         }
+        let free = [x + GAP, y + 6.0];
+        y += ABOVE + highest;
+        corners.extend(line.into_iter().map(|x| [x, y]));
+        let height = y + BELOW;
+        let layout = Layout {
+            cell,
+            corners,
+            height,
+            free,
+        };
+        (layout, count)
     }
-}
 
-/// Draws one map. `cell` returns `None` where no elite is possible, `Some(None)` where one is
-/// missing, or the elite's fitness.
-fn map(
-    canvas: &mut Canvas,
-    [x, y]: [f64; 2],
-    side: f64,
-    cell: &impl Fn([usize; 3]) -> Option<Option<f64>>,
-    scale: &Scale,
-) {
-    let step = side / COUNT_BINS as f64;
-    let gap = 0.08 * step;
-    let strip = (step - gap) / COUNT_BINS as f64;
-    let (mut frames, mut strokes, mut paths) = (
-        Vec::new(),
-        Vec::new(),
-        BTreeMap::<[u8; 3], Vec<Piece>>::new(),
-    );
-    for muscle in 0..COUNT_BINS {
-        for sensor in 0..COUNT_BINS {
-            let left = x + muscle as f64 * step + gap / 2.0;
-            let top = y + side - (sensor + 1) as f64 * step + gap / 2.0;
-            for total in 0..COUNT_BINS {
-                let Some(elite) = cell([muscle, sensor, total]) else {
-                    continue;
-                };
-                let (at, size) = ([left + total as f64 * strip, top], [strip, step - gap]);
-                frames.push(Piece::Rectangle { at, size });
-                if let Some(fitness) = elite {
-                    paths
-                        .entry(scale.colour(fitness).rgb)
-                        .or_default()
-                        .push(Piece::Rectangle { at, size });
-                    if fitness < 0.0 {
-                        strokes.push(stroke(at, size));
-                    }
-                }
+    fn draw(&self, canvas: &mut Canvas, [left, top]: [f64; 2], task: &TaskMap, map: &CellMap) {
+        for (number, (panel, [x, y])) in task.panels.iter().zip(&self.corners).enumerate() {
+            let at = [left + x, top + y];
+            self.panel(canvas, at, panel);
+            if number + 1 == task.panels.len() {
+                self.axes(canvas, at, panel, &map.edges);
             }
         }
     }
-    canvas.area(frames.clone(), colour::PAPER);
-    for (rgb, squares) in paths {
-        canvas.area(squares, Colour { rgb, opacity: 255 });
-    }
-    canvas.path(frames, Pen::new(scales::CELL, 0.3));
-    if !strokes.is_empty() {
+
+    /// Draws a panel whose left lower corner is at `x`, `y`.
+    fn panel(&self, canvas: &mut Canvas, [x, y]: [f64; 2], panel: &Panel) {
+        let Layout { cell, .. } = *self;
+        let gap = 0.08 * cell;
+        let top = y - cell * panel.rows.len() as f64;
+        let (mut hatches, mut strokes, mut frames) = (Vec::new(), Vec::new(), Vec::new());
+        let mut areas = BTreeMap::<[u8; 3], Vec<Piece>>::new();
+        for (row, cells) in panel.rows.iter().enumerate() {
+            for (column, found) in cells.iter().enumerate() {
+                let at = [x + cell * column as f64, top + cell * row as f64].map(|v| v + gap / 2.0);
+                let side = cell - gap;
+                let size = [side; 2];
+                match found {
+                    Cell::Impossible => continue,
+                    Cell::Empty => hatches.extend(hatch(at, side)),
+                    Cell::Elite {
+                        fitness, colour, ..
+                    } => {
+                        let own = areas.entry(colour.rgb).or_default();
+                        own.push(Piece::Rectangle { at, size });
+                        if *fitness < 0.0 {
+                            strokes.push(stroke(at, side));
+                        }
+                    }
+                }
+                frames.push(Piece::Rectangle { at, size });
+            }
+        }
+        canvas.path(hatches, HATCH);
+        for (rgb, squares) in areas {
+            canvas.area(squares, Colour { rgb, opacity: 255 });
+        }
+        canvas.path(frames, Pen::new(scales::CELL, 0.3));
         canvas.path(strokes, STROKE);
+        canvas.text([x, top - 2.5], &panel.total(), TextStyle::default());
+    }
+
+    /// Draws the axes of the panel whose left lower corner is at `x`, `y`.
+    fn axes(&self, canvas: &mut Canvas, [x, y]: [f64; 2], panel: &Panel, edges: &[usize]) {
+        let Layout { cell, .. } = *self;
+        let pen = Pen::new(colour::INK, 0.6);
+        let [wide, high] = [panel.columns(), panel.rows.len()].map(|count| cell * count as f64);
+        canvas.line([x, y], [x + wide, y], pen);
+        canvas.line([x, y], [x, y - high], pen);
+        let widest = |edge: &usize| fonts::width(&edge.to_string(), TEXT, false);
+        let widest = edges.iter().map(widest).fold(0.0, f64::max);
+        let every = ((widest + 3.0) / cell).ceil().max(1.0) as usize;
+        for (bin, edge) in edges.iter().enumerate() {
+            let at = cell * bin as f64;
+            let text = edge.to_string();
+            if at <= wide {
+                canvas.line([x + at, y], [x + at, y + 2.0], pen);
+            }
+            if at <= high {
+                canvas.line([x - 2.0, y - at], [x, y - at], pen);
+            }
+            if bin % every == 0 && at <= wide {
+                canvas.text([x + at, y + 9.5], &text, TextStyle::middle());
+            }
+            if bin % every == 0 && at <= high {
+                let at = [x - 3.5, y - at + 0.36 * TEXT];
+                canvas.text(at, &text, TextStyle::end());
+            }
+        }
+        // A name that is longer than its axis begins with it.
+        let names = [x + wide / 2.0, x + 0.5 * fonts::width(MUSCLES, TEXT, false)];
+        let at = [names[0].min(names[1]), y + 18.0];
+        canvas.text(at, MUSCLES, TextStyle::middle());
+        let upwards = TextStyle {
+            upwards: true,
+            ..TextStyle::default()
+        };
+        canvas.text([x - LEFT + 7.0, y], SENSORS, upwards);
     }
 }
+
+const MUSCLES: &str = "muscle voxels";
+const SENSORS: &str = "sensor voxels";
+
+/// The lines in cells without an elite.
+const HATCH: Pen = Pen {
+    colour: scales::CELL,
+    width: 0.4,
+    dashes: None,
+};
 
 /// The line through cells with fitness below 0: colour-blind viewers could take gray for a colour.
 const STROKE: Pen = Pen {
@@ -203,117 +247,48 @@ const STROKE: Pen = Pen {
     dashes: None,
 };
 
-fn stroke([x, y]: [f64; 2], [width, height]: [f64; 2]) -> Piece {
-    Piece::Line(vec![[x, y + height], [x + width, y]])
+fn stroke([x, y]: [f64; 2], side: f64) -> Piece {
+    Piece::Line(vec![[x, y + side], [x + side, y]])
 }
 
-/// Returns the voxel counts at which bins begin.
-fn edges(area: usize) -> Vec<usize> {
-    (0..COUNT_BINS)
-        .filter_map(|bin| (0..=area).find(|&count| count_bin(count, area) == bin))
-        .collect()
+/// Returns diagonal lines in a square.
+fn hatch([x, y]: [f64; 2], side: f64) -> impl Iterator<Item = Piece> {
+    [0.5, 1.0, 1.5].into_iter().map(move |share| {
+        let (near, far) = (
+            side * f64::max(share - 1.0, 0.0),
+            side * f64::min(share, 1.0),
+        );
+        Piece::Line(vec![[x + near, y + far], [x + far, y + near]])
+    })
 }
 
-fn axes(canvas: &mut Canvas, [x, y]: [f64; 2], side: f64, run: &RunFile, is_first: bool) {
-    let area = run.config.body.height * run.config.body.width;
-    let step = side / COUNT_BINS as f64;
-    let pen = Pen::new(colour::INK, 0.6);
-    canvas.line([x, y + side], [x + side, y + side], pen);
-    canvas.line([x, y], [x, y + side], pen);
-    let every = if step < 18.0 { 2 } else { 1 };
-    for (bin, edge) in edges(area).into_iter().enumerate() {
-        let at = bin as f64 * step;
-        canvas.line([x + at, y + side], [x + at, y + side + 2.5], pen);
-        canvas.line([x - 2.5, y + side - at], [x, y + side - at], pen);
-        if bin % every == 0 {
-            canvas.text(
-                [x + at, y + side + 10.0],
-                &edge.to_string(),
-                TextStyle::middle(),
-            );
-            canvas.text(
-                [x - 4.5, y + side - at + 0.36 * TEXT],
-                &edge.to_string(),
-                TextStyle::end(),
-            );
-        }
-    }
-    canvas.text(
-        [x + side / 2.0, y + side + 20.0],
-        "muscle voxels",
-        TextStyle::middle(),
-    );
-    if is_first {
-        let words = TextStyle {
-            upwards: true,
-            ..TextStyle::middle()
-        };
-        canvas.text([x - LEFT + 8.0, y + side / 2.0], "sensor voxels", words);
-    }
-}
-
-/// Draws the legend; `is_above` if it lies over a map, which leaves little room.
-fn legend(canvas: &mut Canvas, [x, y]: [f64; 2], width: f64, scale: &Scale, is_above: bool) {
-    let name = scale
+fn legend(canvas: &mut Canvas, [x, y]: [f64; 2], map: &CellMap) {
+    let name = map
         .unit
         .map_or("fitness".to_string(), |unit| format!("fitness [{unit}]"));
-    colour_bar(
-        canvas,
-        [x, y + 4.0],
-        width - 6.0,
-        &scale.right,
-        &name,
-        |value| scale.colour(value),
-    );
-    let mut lines = Vec::new();
-    if let Some(lowest) = scale.lowest {
-        lines.push((
-            scales::below(0.5),
-            format!("below 0 (to {})", number(lowest).replace('-', "−")),
-        ));
+    let shared = map.tasks.iter().find(|task| !task.has_own_scale);
+    let highest = shared.map_or(0.0, |task| task.highest);
+    // Without any fitness above 0, the bar has some length all the same.
+    let axis = Axis::exact(0.0, if highest > 0.0 { highest } else { 1.0 }, 5);
+    let colour = |value| colour_of(value, axis.to);
+    let wide = LEGEND[0] - 6.0;
+    colour_bar(canvas, [x, y + 7.0], wide, &axis, &name, colour);
+    let mut top = y + 30.0;
+    let mut line = |canvas: &mut Canvas, fill: Colour, text: &str| {
+        let at = [x, top];
+        top = robot::legend(canvas, at, [(Material::Empty, fill, text)], LEGEND[0]);
+        at
+    };
+    if map.has_below {
+        let at = line(canvas, map.below, "below 0");
+        canvas.path(vec![stroke(at, 7.0)], STROKE);
     }
-    if scale.is_open {
-        lines.push((colour::PAPER, "no elite".to_string()));
+    if map.is_open() {
+        let at = line(canvas, colour::PAPER, "no elite");
+        canvas.path(hatch(at, 7.0).collect(), HATCH);
     }
-    let lines = lines
-        .iter()
-        .map(|(fill, text)| (Material::Empty, *fill, text.as_str()));
-    let below = robot::legend(canvas, [x, y + 26.0], lines, width);
-    if scale.lowest.is_some() {
-        canvas.path(vec![stroke([x, y + 26.0], [7.0, 7.0])], STROKE);
-    }
-    if !is_above {
-        for (k, text) in STRIPS.into_iter().enumerate() {
-            canvas.fitted(
-                [x, below + 6.0 + 9.5 * k as f64],
-                text,
-                width + 10.0,
-                TextStyle::default(),
-            );
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn bins_begin_where_the_descriptor_says() {
-        assert_eq!(edges(196), [0, 28, 56, 84, 112, 140, 168]);
-        assert_eq!(edges(25), [0, 3, 6, 9, 12, 15, 18]);
-    }
-
-    #[test]
-    fn what_is_wrong_is_gray_and_what_is_right_is_not() {
-        let scale = Scale {
-            right: Axis::nice(0.0, 20.0, 4),
-            lowest: Some(-10.0),
-            is_open: true,
-            unit: None,
-        };
-        assert_eq!(scale.colour(20.0), scales::sequential(1.0));
-        assert_eq!(scale.colour(-10.0), scales::below(0.0));
-        assert_ne!(scale.colour(-0.1), scale.colour(0.1));
+    for text in ["above each panel:", "voxels in all"] {
+        canvas.text([x, top + 6.0], text, TextStyle::default());
+        top += 9.5;
     }
 }

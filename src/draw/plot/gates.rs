@@ -104,7 +104,7 @@ fn map(canvas: &mut Canvas, at: [f64; 2], side: f64, gate: &GateWalks) {
     let squares = gate.walks.iter().map(|((row, column), walk)| {
         let colour = match walk {
             Some(walk) => scales::diverging(walk / STRONG),
-            None => scales::below(0.5),
+            None => scales::BELOW,
         };
         ((last - row, column), colour)
     });

@@ -7,6 +7,7 @@ use crate::draw::colour::Colour;
 use crate::draw::plot::canvas::{Canvas, Pen, Piece, TextStyle};
 use crate::draw::plot::scales;
 use crate::draw::walk::{Walk, area};
+use crate::task::recording::FramedImage;
 use std::collections::BTreeMap;
 
 /// Shades of a material in a figure: more would look alike in print.
@@ -167,6 +168,27 @@ pub(crate) fn stimulus(
     });
     canvas.frame(at, size, Pen::new(colour::FAINT, 0.5));
     size
+}
+
+/// Draws an image with the part framed that a body covers.
+pub(crate) fn framed(canvas: &mut Canvas, at: [f64; 2], side: f64, image: &FramedImage) {
+    let pixels = &image.pixels;
+    stimulus(
+        canvas,
+        at,
+        side,
+        &pixels.map(|pixel| f64::from(*pixel) / 255.0),
+    );
+    let cell = side / pixels.height().max(pixels.width()).max(1) as f64;
+    let [rows, columns] = image
+        .window()
+        .map(|ends| ends.map(|place| cell * place as f64));
+    // The line lies inside the frame.
+    canvas.frame(
+        [at[0] + columns[0] + 0.5, at[1] + rows[0] + 0.5],
+        [columns[1] - columns[0] - 1.0, rows[1] - rows[0] - 1.0],
+        Pen::new(colour::WINDOW, 1.0),
+    );
 }
 
 /// Draws the body at a frame with its outline: voxels in the colour of their material, darker the

@@ -50,8 +50,18 @@ const PURPLE_GREEN: [[u8; 3]; 9] = [
     [0x1b, 0x78, 0x37],
 ];
 
-/// Grays from dark to light, for values below a scale.
-const GRAYS: [[u8; 3]; 2] = [[0x60, 0x62, 0x68], [0xc4, 0xc6, 0xca]];
+/// Values below a scale.
+pub(crate) const BELOW: Colour = Colour::new(0xa6, 0xa8, 0xad);
+
+/// White to dark blue (ColorBrewer's Blues), for shares of a whole.
+const BLUES: [[u8; 3]; 6] = [
+    [0xff, 0xff, 0xff],
+    [0xd6, 0xe6, 0xf4],
+    [0xab, 0xcf, 0xe6],
+    [0x56, 0xa0, 0xce],
+    [0x1d, 0x6c, 0xb1],
+    [0x08, 0x30, 0x6b],
+];
 
 /// Returns the colour at `t` in [0, 1] of a scale from dark to bright.
 pub(crate) fn sequential(t: f64) -> Colour {
@@ -63,9 +73,9 @@ pub(crate) fn diverging(t: f64) -> Colour {
     between(&PURPLE_GREEN, (t + 1.0) / 2.0)
 }
 
-/// Returns the gray at `t` in [0, 1], from dark to light.
-pub(crate) fn below(t: f64) -> Colour {
-    between(&GRAYS, t)
+/// Returns the colour of a share in [0, 1], from white to dark.
+pub(crate) fn share(t: f64) -> Colour {
+    between(&BLUES, t)
 }
 
 /// Interpolates between equally spaced colours; `t` is in [0, 1].
@@ -97,5 +107,10 @@ mod tests {
             .map(|i| level(sequential(f64::from(i) / 20.0)))
             .collect();
         assert!(levels.windows(2).all(|w| w[0] < w[1]), "{levels:?}");
+        let shares: Vec<f64> = (0..=20)
+            .map(|i| level(share(f64::from(i) / 20.0)))
+            .collect();
+        assert!(shares[0] > 254.0 && shares[20] < 60.0, "{shares:?}");
+        assert!(shares.windows(2).all(|w| w[0] > w[1]), "{shares:?}");
     }
 }

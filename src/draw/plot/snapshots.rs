@@ -42,7 +42,13 @@ pub(crate) fn snapshots(
     let [left, right, highest] = reach.fold([0.0, 0.0, 1.0f64], |a, b| {
         [a[0].min(b[0]), a[1].max(b[1]), a[2].max(b[2])]
     });
-    let plot_width = wide - STIMULUS - 8.0;
+    // The whole image stands before what the sensors see of it.
+    let has_images = recording
+        .phases
+        .iter()
+        .any(|phase| phase.seen.image.is_some());
+    let pictures = STIMULUS + if has_images { STIMULUS + 3.0 } else { 0.0 } + 8.0;
+    let plot_width = wide - pictures;
     let scale = (plot_width / (right - left + 2.0)).min(LARGEST);
     let x = Axis::exact(
         (left + right - plot_width / scale) / 2.0,
@@ -61,19 +67,23 @@ pub(crate) fn snapshots(
         let d = signed(recording.phases[phase].displacement);
         let text = format!("{label}: {d} voxel lengths");
         canvas.fitted(
-            [at[0] + STIMULUS + 8.0, at[1] + 7.0],
+            [at[0] + pictures, at[1] + 7.0],
             &text,
             plot_width,
             TextStyle::default().bold(),
         );
+        let seen = &recording.phases[phase].seen;
+        if let Some(image) = &seen.image {
+            robot::framed(&mut canvas, [at[0], at[1] + 1.0], STIMULUS, image);
+        }
         robot::stimulus(
             &mut canvas,
-            [at[0], at[1] + 1.0],
+            [at[0] + pictures - STIMULUS - 8.0, at[1] + 1.0],
             STIMULUS,
-            &recording.phases[phase].seen.stimulus,
+            &seen.stimulus,
         );
         let plot = Plot {
-            at: [at[0] + STIMULUS + 8.0, at[1] + panel_height - 12.0 - high],
+            at: [at[0] + pictures, at[1] + panel_height - 12.0 - high],
             size: [plot_width, high],
             x: x.clone(),
             y: Axis::exact(0.0, high / scale, 2),

@@ -108,20 +108,13 @@ pub fn confusion(file: &TeamFile) -> Option<Figure> {
             let x = left + side * column as f64;
             let share = *images as f64 / of_class.max(1) as f64;
             let size = [side - 0.5, side - 0.5];
-            canvas.rectangle(
-                [x, y],
-                size,
-                if *images == 0 {
-                    Colour::gray(0.97)
-                } else {
-                    scales::sequential(share)
-                },
-            );
-            if *images > 0 && has_numbers {
-                let ink = if share > 0.6 {
-                    colour::INK
-                } else {
-                    colour::PAPER
+            canvas.rectangle([x, y], size, scales::share(share));
+            canvas.frame([x, y], size, Pen::new(scales::GRID, 0.4));
+            if has_numbers {
+                let ink = match share {
+                    0.0 => colour::FAINT,
+                    share if share < 0.5 => colour::INK,
+                    _ => colour::PAPER,
                 };
                 let at = [x + side / 2.0, y + side / 2.0 + 0.36 * TEXT];
                 canvas.text(at, &images.to_string(), TextStyle::middle().colour(ink));

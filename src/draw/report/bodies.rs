@@ -20,22 +20,38 @@ pub(super) struct Rollouts(pub(super) BTreeMap<(usize, String), String>);
 /// Robots of each kind in the page.
 const SHOWN: usize = 5;
 
-/// Returns a button that plays a robot. The tuple holds its style, a name before the robot's
-/// figures for screen readers, and whether it plays first.
+/// The look of a button that plays a robot.
+#[derive(Default)]
+pub(super) struct Look<'a> {
+    pub(super) class: &'a str,
+    pub(super) style: &'a str,
+    /// A name before the robot's figures, for screen readers.
+    pub(super) name: &'a str,
+    /// True if it plays first.
+    pub(super) first: bool,
+}
+
+/// Returns a button that plays a robot.
 pub(super) fn button(
     run: usize,
     (dossier, spell): (&Dossier, Spell),
     rollouts: &Rollouts,
     robot: &Robot,
-    (style, name, first): (&str, &str, bool),
+    look: &Look,
     content: &str,
 ) -> String {
+    let Look {
+        class,
+        style,
+        name,
+        first,
+    } = *look;
     let about = about(dossier, robot);
     let rollout = rollouts.id(run, &robot.id).unwrap_or_default();
     let replay = Invocation::new("replay").option("robot", robot.id.as_str());
     let command = spell(&replay.option("archive", dossier.path.as_path()));
     format!(
-        "<button type=\"button\" style=\"{style}\" data-robot=\"{}\" data-rollout=\"{}\" data-about=\"{}\" \
+        "<button type=\"button\" class=\"{class}\" style=\"{style}\" data-robot=\"{}\" data-rollout=\"{}\" data-about=\"{}\" \
          data-command=\"{}\" \
          aria-pressed=\"false\" aria-label=\"{}\" title=\"{}\"{}>{content}</button>",
         escape(&robot.id),
@@ -110,7 +126,10 @@ pub(super) fn bodies(run: usize, dossier: &Dossier, rollouts: &Rollouts, spell: 
                 (dossier, spell),
                 rollouts,
                 robot,
-                ("", "", is_first),
+                &Look {
+                    first: is_first,
+                    ..Look::default()
+                },
                 &content,
             )
         })

@@ -83,7 +83,7 @@ pub(crate) fn remarks(file: &TeamFile) -> Vec<String> {
             file.dataset, file.split
         ),
         format!(
-            "most votes: {} % of the images had a tie; on average {} % of the robots that know the answer voted \
+            "most votes: {} % of the images had a tie, which the longer walks decided; on average {} % of the robots that know the answer voted \
              for it, {} of {robots} did not move",
             percent(answers.ties),
             percent(answers.agreement),

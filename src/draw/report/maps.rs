@@ -4,14 +4,13 @@ use crate::analysis::dossier::{Dossier, Gathered};
 use crate::base::threads::in_pool;
 use crate::draw::error::PictureError;
 use crate::draw::html::{escape, packed};
-use crate::draw::plot::{below, sequential};
+use crate::draw::plot::cells::{Cell, CellMap, TaskMap};
 use crate::draw::report::Spell;
-use crate::draw::report::bodies::{Rollouts, bodies, button};
+use crate::draw::report::bodies::{Look, Rollouts, bodies, button};
 use crate::draw::walk::Walk;
-use crate::qd::descriptor::{COUNT_BINS, DescriptorSpace, possible_cells};
 use crate::store::run::Robot;
 use rayon::prelude::*;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Bytes of all rollouts of a page before packing; packed and as text they take about as many.
 const MOST_BYTES: usize = 13_000_000;
@@ -88,17 +87,6 @@ impl Rollouts {
     }
 }
 
-/// Describes the counts in a bin.
-fn range(bin: usize, area: usize) -> String {
-    let width = (area / COUNT_BINS).max(1);
-    let last = if bin + 1 == COUNT_BINS {
-        area
-    } else {
-        ((bin + 1) * width - 1).min(area)
-    };
-    format!("{}–{last}", bin * width)
-}
-
 /// Returns the map with its player.
 pub(super) fn archive(
     number: usize,
@@ -107,111 +95,97 @@ pub(super) fn archive(
     spell: Spell,
 ) -> String {
     let run = &dossier.run;
-    let tasks = &run.dimensions.tasks;
-    let area = run.config.body.height * run.config.body.width;
-    let space = DescriptorSpace::voxel_counts(tasks.len());
-    let possible: BTreeSet<Vec<usize>> =
-        possible_cells(area, run.config.body.min_muscles, tasks.len())
-            .into_iter()
-            .filter_map(|index| space.coordinates(index))
-            .collect();
-    let elites: BTreeMap<&[usize], &Robot> = run
-        .elites
-        .iter()
-        .map(|robot| (robot.cell.as_slice(), robot))
-        .collect();
-    let highest = run
-        .elites
-        .iter()
-        .map(|robot| robot.objective)
-        .fold(0.0, f64::max);
-    let colour = |objective: f64| match objective < 0.0 {
-        true => below(0.7).hex(),
-        false => sequential(if highest > 0.0 {
-            objective / highest
-        } else {
-            0.0
-        })
-        .hex(),
-    };
-    let mut out =
-        "<p>A square is a cell of the archive: how many muscle voxels (right) and sensor voxels (up) a \
-     body has, one map for each \
-        range of voxels in all. Press one to watch its robot; hatched cells are empty.</p>\n"
-            .to_string();
-    if tasks.len() > 1 {
-        let options: String = tasks
-            .iter()
-            .enumerate()
-            .map(|(place, task)| format!("<option value=\"{place}\">{}</option>", escape(task)))
-            .collect();
+    let map = CellMap::of(run);
+    let mut out = "<p>A square is a cell of the archive: how many muscle voxels (right) and sensor voxels (up) a \
+                   body has, one panel for each range of voxels in all. Press one to watch its robot.</p>\n"
+        .to_string();
+    if map.tasks.len() > 1 {
+        let option = |(place, task): (usize, &TaskMap)| {
+            format!("<option value=\"{place}\">{}</option>", escape(&task.name))
+        };
+        let options: String = map.tasks.iter().enumerate().map(option).collect();
         out += &format!("<p><label>Task <select class=\"task\">{options}</select></label></p>\n");
     }
-    let stops: Vec<String> = (0..=8)
-        .map(|k| sequential(f64::from(k) / 8.0).hex())
-        .collect();
-    out += &format!(
-        "<div class=\"scale\">fitness 0 <i style=\"background:linear-gradient(90deg,{})\"></i> {}; gray: below \
-         0</div>\n",
-        stops.join(","),
-        run.in_units(highest)
-    );
     out += "<div class=\"archive\">\n<div>\n";
     let best = played(dossier, 1).first().map(|robot| robot.id.clone());
-    for (place, task) in tasks.iter().enumerate() {
+    let elites: BTreeMap<&str, &Robot> = run
+        .elites
+        .iter()
+        .map(|robot| (robot.id.as_str(), robot))
+        .collect();
+    for (place, task) in map.tasks.iter().enumerate() {
         out += &format!(
-            "<div class=\"map\" data-task=\"{place}\" role=\"group\" aria-label=\"Cells of {}\">\n",
-            escape(task)
+            "<div class=\"map\" data-task=\"{place}\" role=\"group\" aria-label=\"Cells of {}\">\n{}",
+            escape(&task.name),
+            key(&map, task, &run.in_units(task.highest))
         );
-        for total in 0..COUNT_BINS {
+        for panel in &task.panels {
             let mut cells = String::new();
-            // Leaves out rows in which no body is possible.
-            let highest = possible
-                .iter()
-                .filter(|cell| cell[2] == total)
-                .map(|cell| cell[1])
-                .max();
-            let Some(highest) = highest else { continue };
-            for sensor in (0..=highest).rev() {
-                for muscle in 0..COUNT_BINS {
-                    let mut cell = vec![muscle, sensor, total];
-                    cell.extend((tasks.len() > 1).then_some(place));
+            for (row, found) in panel.rows.iter().enumerate() {
+                for (column, cell) in found.iter().enumerate() {
+                    let sensor = panel.rows.len() - 1 - row;
                     let name = format!(
                         "muscle {}, sensor {}, voxels {}",
-                        range(muscle, area),
-                        range(sensor, area),
-                        range(total, area)
+                        map.counts(column),
+                        map.counts(sensor),
+                        panel.total()
                     );
-                    cells += &match elites.get(cell.as_slice()) {
-                        Some(robot) => {
-                            let style = format!("background:{}", colour(robot.objective));
-                            let first = best.as_ref() == Some(&robot.id);
-                            button(
-                                number,
-                                (dossier, spell),
-                                rollouts,
-                                robot,
-                                (&style, &name, first),
-                                "",
-                            )
+                    cells += &match cell {
+                        Cell::Elite {
+                            robot,
+                            fitness,
+                            colour,
+                        } => {
+                            let class = if *fitness < 0.0 { "below" } else { "" };
+                            let style = format!("background-color:{}", colour.hex());
+                            let first = best.as_ref() == Some(robot);
+                            let look = Look {
+                                class,
+                                style: &style,
+                                name: &name,
+                                first,
+                            };
+                            let robot = elites[robot.as_str()];
+                            button(number, (dossier, spell), rollouts, robot, &look, "")
                         }
-                        None if possible.contains(&cell) => {
-                            format!(
-                                "<span class=\"empty\" role=\"img\" aria-label=\"{name}: empty\"></span>"
-                            )
-                        }
-                        None => "<span></span>".to_string(),
+                        Cell::Empty => format!(
+                            "<span class=\"empty\" role=\"img\" aria-label=\"{name}: empty\"></span>"
+                        ),
+                        Cell::Impossible => "<span></span>".to_string(),
                     };
                 }
             }
             out += &format!(
-                "<figure><div class=\"cells\">{cells}</div><figcaption>{} voxels</figcaption></figure>\n",
-                range(total, area)
+                "<figure><div class=\"cells\" data-columns=\"{}\">{cells}</div>\
+                 <figcaption>{} voxels</figcaption></figure>\n",
+                panel.columns(),
+                panel.total()
             );
         }
         out += "</div>\n";
     }
     out + "</div>\n" + PLAYER + "</div>\n"
+}
+
+/// Returns the meaning of the colours.
+fn key(map: &CellMap, task: &TaskMap, highest: &str) -> String {
+    let colours: Vec<String> = map.colours.iter().map(|colour| colour.hex()).collect();
+    let own = match task.has_own_scale {
+        true => " (a scale of its own, since it dwarfs the other tasks)",
+        false => "",
+    };
+    let below = match map.has_below {
+        true => format!(
+            "<span><b class=\"below\" style=\"background-color:{}\"></b> below 0</span>",
+            map.below.hex()
+        ),
+        false => String::new(),
+    };
+    format!(
+        "<div class=\"key\"><span>fitness 0 <i style=\"background:linear-gradient(90deg,{})\"></i> \
+         {highest}{own}</span>{below}<span><b class=\"empty\"></b> no robot</span></div>\n",
+        colours.join(",")
+    )
 }
 
 /// Returns the robots of a training with their player.

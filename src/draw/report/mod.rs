@@ -70,6 +70,7 @@ impl Content<'_> {
         let style = [
             include_str!("../replay.css"),
             include_str!("../stages.css"),
+            include_str!("../cells.css"),
             include_str!("report.css"),
         ]
         .concat();

@@ -68,7 +68,7 @@
   const $ = (what) => team.querySelector(what);
   const { members, classes, class_names, threshold, unit, steps, materials } = JSON.parse(document.getElementById("team-robots").textContent);
   const stages = new Stages.Team($(".stages"), $(".tally"), { members, classes, class_names, threshold, materials });
-  const { name } = Drawing.classNames(class_names);
+  const names = Drawing.classNames(class_names);
   const time = $("input"), last = steps.length - 1;
   // Points of a robot at all moments: differences of 8 bits to the moment before, at first 16-bit numbers.
   const moments = (text, count) => {
@@ -90,8 +90,8 @@
     // At the end the answer, also one that no robot voted for.
     const tally = walk.tallies[Math.floor(at)], over = at >= last, says = over ? walk.answer : tally.says;
     stages.draw(members.map((_, k) => stand(k, at)), walk.starts, { ...tally, says });
-    const verdict = over ? (says === walk.class ? ": correct" : ": wrong") : "";
-    $(".says").textContent = `step ${steps[Math.floor(at)]} ` + (says === null ? "" : `says ${name(says)}${verdict}`);
+    const verdict = over ? (says === walk.class ? ": correct" : ": wrong") : "", said = Stages.said({ ...tally, says }, names);
+    $(".says").textContent = `step ${steps[Math.floor(at)]} ` + (says === null ? "" : `says ${said.says}${said.tie && ` (${said.tie})`}${verdict}`);
     $(".play").textContent = playing === null ? "Play" : "Pause";
   };
   const at = () => Number(time.value);

@@ -6,7 +6,7 @@ import { Images } from "./images.js";
 import { Simulation } from "./simulation.js";
 import { Pad } from "./pad.js";
 import { Robots, rows, signed } from "./robots.js";
-import { Stage, drawStimulus } from "./stage.js";
+import { Stage, drawStimulus, drawWhole } from "./stage.js";
 import { Team } from "./team.js";
 
 // Strokes may follow each other that fast without a simulation for each.
@@ -38,10 +38,45 @@ const forget = () => {
   for (const id of ["says", "moved", "step"]) $(id).textContent = "";
 };
 
+// Classes in a sentence: "0, 1 or 2". Many are cut short.
+const MOST_CLASSES = 10;
+const listed = (classes, name, word) => {
+  const some = classes.slice(0, MOST_CLASSES).map(name);
+  if (some.length < classes.length) return `${some.join(", ")} …`;
+  return some.length > 1 ? `${some.slice(0, -1).join(", ")} ${word} ${some.at(-1)}` : some.join("");
+};
+
+// All digits, by number and without a name.
+const isDigits = (classes, names) => !names && classes.length === 10;
+
+// What the chosen body knows, above the pad and beside its answer: it names none but these classes, whatever is drawn.
+const invite = () => {
+  const say = (invites, knows = "") => { $("invites").replaceChildren(...[invites].flat()); $("knows").textContent = knows; };
+  if (!who) return say("");
+  const gate = who.robot?.gate;
+  if (gate) return say(`This body computes ${gate} of cues, not of drawings: switch them under Test images.`);
+  const { left = [], right = [] } = who.robot?.judge ?? {};
+  const classes = who.team ? team.classes : left.concat(right).sort((a, b) => a - b);
+  if (!classes.length) return say(`Draw anything. This body ${who.own ? "has no task" : "names no class"}: only the direction of its walk counts.`);
+  const given = who.team ? team.class_names : who.from.class_names, { a, name } = Drawing.classNames(given);
+  if (isDigits(classes, given)) return say("Draw any digit from 0 to 9.");
+  const invites = [`Draw ${classes.length > 3 ? "one of " + listed(classes, name, "or") : listed(classes, a, "or")}.`];
+  const knows = `it knows only ${listed(classes, name, "and")}`;
+  // The team answers about more classes of the same data.
+  const wider = !who.team && team.classes && String(team.class_names ?? "") === String(given ?? "") && classes.every((label) => team.classes.includes(label)) && team.classes.length > classes.length;
+  if (wider) {
+    const link = element("a", { href: "#team", textContent: "Team" });
+    link.onclick = (e) => { e.preventDefault(); $("tab-team").click(); };
+    invites.push(` For ${isDigits(team.classes, given) ? "all ten digits" : listed(team.classes, name, "and")}: `, link);
+  }
+  say(invites, knows);
+};
+
 const start = () => {
   clearTimeout(timer);
   if (!who) return;
   forget();
+  invite();
   mark("living");
   simulation?.stop();
   team.stop();
@@ -89,6 +124,7 @@ const glance = async () => {
 const look = () => {
   $("picture").textContent = picture.about;
   if (!seen || !who) return;
+  drawWhole($("whole"), seen.image);
   drawStimulus($("stimulus"), seen.stimulus, who.rows(), materials);
 };
 
@@ -153,7 +189,7 @@ const editor = new Editor(materials, {
   live: () => {
     who = { own: true, name: "Your body", subject: () => editor.subject, rows: () => editor.cells.map((row) => row.join("")), steps: () => editor.steps };
     $("who").textContent = "Your body";
-    $("about").textContent = "from the editor; it has no task, so its walks say nothing";
+    $("about").textContent = "from the editor";
     $("encoding").textContent = `${editor.cells.length} × ${editor.cells[0].length} pixels`;
     start();
   },
@@ -180,28 +216,28 @@ const drawTeam = () => {
   if (!walk?.begun) return;
   const says = walk.tally?.says ?? null, known = walk.end && says !== null && walk.begun.classes.includes(walk.begun.seen.label);
   $("verdict").dataset.state = known ? (says === walk.begun.seen.label ? "right" : "wrong") : says === null ? (walk.end ? "none" : "idle") : "answer";
-  const said = says === null ? (walk.end ? "undecided" : "") : team.names.name(says);
+  const { says: all, tie } = Stages.said(walk.tally, team.names), said = says === null && walk.end ? "undecided" : all;
   $("verdict").dataset.long = String(said.length > LONG);
   $("says").textContent = said;
-  $("moved").textContent = `step ${walk.step} of ${walk.begun.until}`;
+  $("moved").textContent = `${tie ? `${tie} · ` : ""}step ${walk.step} of ${walk.begun.until}`;
   const play = walk.end || walk.paused ? "Play" : "Pause";
   if ($("play").textContent !== play) $("play").textContent = play;
   if (walk.end && !walk.told) {
     walk.told = true;
     if (document.documentElement.dataset.state === "living") mark("over");
-    $("spoken").textContent = `The team sees ${picture.about}. It says ${says === null ? "nothing" : said}.`;
+    $("spoken").textContent = `The team sees ${picture.about}. It says ${says === null ? "nothing" : tie ? `${said}, ${tie}` : said}.`;
   }
 };
 
 const words = (answer, over) => {
   const distance = Math.abs(answer.moved).toFixed(1);
-  if (!answer.way) return { state: over ? "none" : "idle", says: over ? "undecided" : "", moved: `moved ${distance} voxels` };
+  if (!answer.way) return { state: over ? "none" : "idle", says: over ? "undecided" : "", moved: `moved ${distance} voxel lengths` };
   const { name } = Drawing.classNames(simulation.begun.class_names);
   const says = answer.says.length ? answer.says.map(name).join(" or ") : answer.way === "left" ? "←" : "→";
   const label = simulation.phase(simulation.frame).label;
   const { left, right } = simulation.begun.judge ?? { left: [], right: [] };
   const known = over && answer.says.length && left.concat(right).includes(label);
-  return { state: known ? (answer.says.includes(label) ? "right" : "wrong") : "answer", says, moved: `moved ${distance} voxels ${answer.way}` };
+  return { state: known ? (answer.says.includes(label) ? "right" : "wrong") : "answer", says, moved: `moved ${distance} voxel lengths ${answer.way}` };
 };
 
 const draw = () => {
@@ -305,6 +341,7 @@ try {
   pictured();
   await robots.load();
   await team.load();
+  invite();
   if (window.matchMedia("(prefers-reduced-motion: reduce)").matches) simulation?.play(false);
 } catch (error) { say(error); }
 document.documentElement.dataset.ready = "yes";

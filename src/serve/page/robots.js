@@ -18,7 +18,8 @@ export class Robots {
   async load() {
     this.list = await get("api/archives");
     this.names();
-    await this.open(0);
+    // An archive that was named when the page was opened comes first.
+    await this.open(Math.max(0, this.list.findIndex((one) => one.chosen)));
   }
 
   names() {
@@ -89,19 +90,20 @@ export class Robots {
 
   // The tasks and verdicts that there are, to show only robots of one. What is chosen stays if there still is a choice.
   choices() {
-    const { tasks, robots } = this.from, verdicts = [...new Set(robots.map((robot) => robot.audit?.verdict).filter(Boolean))].sort();
+    const { tasks, robots, map } = this.from, verdicts = [...new Set(robots.map((robot) => robot.audit?.verdict).filter(Boolean))].sort();
     for (const [id, all, values] of [["task", "all tasks", tasks], ["audit", "all verdicts", verdicts]]) {
       const select = $(id), { value } = select, wanted = ["", ...values];
       // A list that is open stays open.
       if (wanted.join("\n") === [...select.options].map((option) => option.value).join("\n")) continue;
-      select.replaceChildren(...wanted.map((text) => new Option(text || all, text)));
+      const name = (text) => (id === "task" && map?.tasks[tasks.indexOf(text)]?.name) || text;
+      select.replaceChildren(...wanted.map((text) => new Option(name(text) || all, text)));
       select.hidden = values.length < 2;
       select.value = !select.hidden && values.includes(value) ? value : "";
     }
   }
 
   show() {
-    const { robots, bins } = this.from, task = $("task").value, verdict = $("audit").value;
+    const { robots, map } = this.from, task = $("task").value, verdict = $("audit").value;
     const kept = robots.filter((robot) => (!task || robot.task === task) && (!verdict || robot.audit?.verdict === verdict));
     $("count").textContent = kept.length === robots.length ? robots.length === 1 ? "1 robot" : `${robots.length} robots, fittest first` : `${kept.length} of ${robots.length} robots`;
     const few = this.all ? kept : kept.slice(0, FEW);
@@ -109,7 +111,7 @@ export class Robots {
     $("more").textContent = `Show all ${kept.length}`;
     const held = document.activeElement, place = ["cards", "map"].find((id) => $(id).contains(held));
     $("cards").replaceChildren(...few.map((robot) => this.card(robot)));
-    $("map").hidden = bins.length !== 3 || robots.length === 0;
+    $("map").hidden = !map || robots.length === 0;
     if (!$("map").hidden) this.map(kept);
     this.mark();
     // A run under way is read anew under the reader's hands.
@@ -131,42 +133,43 @@ export class Robots {
     return button;
   }
 
-  // One panel per bin of size; in it, bins of muscle (up) and sensor voxels (to the right). More of either than all
-  // there is is not possible, so panels grow.
-  map(robots) {
-    const [muscle, sensor, total] = this.from.bins, best = new Map();
-    for (const robot of robots) {
-      const key = robot.cell.slice(0, 3).join();
-      if (!best.has(key) || best.get(key).fitness < robot.fitness) best.set(key, robot);
-    }
-    const values = robots.map((robot) => robot.fitness);
-    // A robot that fails, fails: by how much would hide what the others do.
-    const high = Math.max(...values), least = Math.min(...values), low = high > 0 ? Math.max(0, least) : least;
-    const panels = Array.from({ length: total }, (_, t) => {
-      const cells = element("div", { className: "cells" }), wide = Math.min(sensor, t + 1);
-      cells.style.gridTemplateColumns = `repeat(${wide}, auto)`;
-      for (let m = Math.min(muscle, t + 1) - 1; m >= 0; m--) for (let s = 0; s < wide; s++) {
-        const robot = best.get([m, s, t].join());
-        if (!robot) { cells.append(element("i")); continue; }
-        const share = high > low ? 100 * Math.max(0, robot.fitness - low) / (high - low) : 100;
+  // The cells of a task as cells.rs describes them: the task that was chosen, or that of the chosen robot. Robots that are left out
+  // are pale.
+  map(kept) {
+    const { map, robots, tasks } = this.from, byId = new Map(robots.map((robot) => [robot.id, robot])), shown = new Set(kept);
+    const wanted = $("task").value || this.robot?.task, at = Math.max(0, tasks.indexOf(wanted)), task = map.tasks[at];
+    this.mapped = at;
+    const panels = task.panels.map(({ voxels, rows }) => {
+      const cells = element("div", { className: "cells" }, ...rows.flat().map((cell) => {
+        if (cell === "impossible") return element("span");
+        const robot = byId.get(cell.elite?.robot);
+        if (!robot) return element("span", { className: "empty" });
         const text = `${robot.id}: fitness ${signed(robot.fitness, 2)}; ${robot.voxels.muscle} muscle, ${robot.voxels.sensor} sensor of ${robot.voxels.total} voxels`;
-        const button = element("button", { type: "button", title: text });
+        const button = element("button", { type: "button", title: text, className: [robot.fitness < 0 ? "below" : "", shown.has(robot) ? "" : "faded"].join(" ").trim() });
         button.setAttribute("aria-label", text);
-        // One that fails differs from a cell that is empty.
-        if (robot.fitness <= 0) button.className = "fails";
-        else button.style.background = `color-mix(in oklab, var(--map-low), var(--map-high) ${share.toFixed(0)}%)`;
+        button.style.backgroundColor = cell.elite.colour;
         button.dataset.robot = robot.id;
         button.onclick = () => this.choose(robot);
-        cells.append(button);
-      }
-      return element("figure", {}, cells, element("figcaption", { textContent: `size ${t + 1}` }));
+        return button;
+      }));
+      cells.dataset.columns = rows[0].length;
+      return element("figure", {}, cells, element("figcaption", { textContent: `${voxels[0]}–${voxels[1]} voxels` }));
     });
-    const ends = element("span", { className: "ends" }, element("span", { textContent: (least < low ? "≤ " : "") + signed(low, 1) }), element("span", { textContent: signed(high, 1) }));
-    const key = element("p", { className: "key" }, "Cells of the archive: muscle voxels upwards, sensors to the right, a panel per size of the body. Fitness:", element("span", { className: "scale" }), ends, robots.some((robot) => robot.fitness <= 0) ? element("span", { className: "failing" }, element("i"), "0 or less") : "");
-    $("map").replaceChildren(...(robots.length ? panels : []), key);
+    const bar = element("i"), unit = map.unit ? ` ${map.unit}` : "", own = task.has_own_scale ? " (a scale of its own, since it dwarfs the other tasks)" : "";
+    bar.style.background = `linear-gradient(90deg, ${map.colours.join()})`;
+    const box = (name, text, fill = "") => { const b = element("b", { className: name }); b.style.backgroundColor = fill; return element("span", {}, b, text); };
+    const key = element("div", { className: "key" }, element("span", {}, `${map.tasks.length > 1 ? `Task ${task.name}. ` : ""}Muscle voxels to the right, sensor voxels upwards, a panel for each range of voxels in all.`),
+      element("span", {}, "Fitness 0", bar, `${signed(task.highest, 2)}${unit}${own}`), ...(map.has_below ? [box("below", "below 0", map.below)] : []), box("empty", "no robot"));
+    $("map").replaceChildren(key, ...panels);
   }
 
-  choose(robot) { this.robot = robot; this.mark(); this.chosen(robot, this.from); }
+  choose(robot) {
+    this.robot = robot;
+    // A robot of another task is on another map.
+    if (!$("map").hidden && !$("task").value && this.from.tasks.indexOf(robot.task) !== this.mapped) this.show();
+    this.mark();
+    this.chosen(robot, this.from);
+  }
 
   mark() {
     for (const button of document.querySelectorAll("[data-robot]")) {

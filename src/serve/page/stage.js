@@ -3,16 +3,15 @@
 const { css, fit } = Drawing;
 
 const NOWHERE = -32768;
+// Side of the whole picture beside what the sensors see, pixels.
+const WHOLE = 66;
 
 export class Stage {
   constructor(canvas, materials) { this.canvas = canvas; this.materials = materials; this.camera = null; this.simulation = null; }
 
-  // What stays the same all through a simulation.
   prepare(simulation) {
-    const first = this.places(simulation, 0);
-    let size = 1, top = 1;
-    for (const q of first) { size = Math.max(size, 2 * Math.abs(q[0] - simulation.moments[0].x)); top = Math.max(top, q[1]); }
-    this.simulation = simulation; this.sides = Drawing.sidesOf(simulation.begun.voxels, simulation.begun.points); this.size = size; this.tall = top; this.camera = null;
+    this.simulation = simulation; this.sides = Drawing.sidesOf(simulation.begun.voxels, simulation.begun.points); this.camera = null;
+    this.room = new Drawing.Room(this.places(simulation, 0), simulation.moments[0].x);
   }
 
   // Points in voxel lengths; null where the simulation had lost one.
@@ -28,14 +27,13 @@ export class Stage {
     const ctx = fit(canvas, width, height), surface = height - groundHeight;
     const ready = simulation && simulation.begun && simulation.moments.length;
     if (ready && this.simulation !== simulation) this.prepare(simulation);
-    const shown = ready ? (phone ? 1.25 * this.size + 11 : 1.9 * this.size + 12) : 40;
-    const scale = Math.min(width / shown, (surface - 30) / (ready ? 1.22 * this.tall : 10), 36);
     const frame = ready ? simulation.frame : 0;
     const at = ready ? simulation.moments[frame].x : 0, zero = ready ? simulation.moments[0].x : 0;
+    const body = ready ? this.room.take(this.places(simulation, frame), at) : null;
+    const shown = ready ? (phone ? 1.25 * this.room.size + 11 : 1.5 * this.room.size + 14) : 40;
+    const scale = Math.min(width / shown, (surface - 30) / (ready ? 1.1 * this.room.tall : 10), 36);
     // The camera stands until the robot nears the edge.
-    const room = Math.max(0, width / scale / 2 - this.size / 2 - 4);
-    const from = this.camera ?? at, camera = Math.min(Math.max(from, at - room), at + room);
-    this.camera = frame === 0 ? at : camera;
+    this.camera = !ready || frame === 0 ? at : Drawing.camera(this.camera ?? at, body, width / scale, 3);
     const x0 = this.camera - width / 2 / scale;
     const X = (x) => Math.min(Math.max((x - x0) * scale, -9999), 9999);
     const Y = (y) => Math.min(Math.max(surface - y * scale, -9999), 9999);
@@ -98,6 +96,14 @@ export const drawStimulus = (canvas, stimulus, rows, materials) => {
   const space = canvas.parentElement.clientWidth, room = Math.min(space, 200, canvas.clientWidth || space);
   const grey = (r, c) => Math.round(255 * stimulus[r][c]);
   Drawing.stimulus(canvas, room, { height: stimulus.length, width: stimulus[0].length, grey }, rows, materials.list);
+};
+
+// The whole picture with the part framed that the sensors see; undefined if they see all of it.
+export const drawWhole = (canvas, image) => {
+  canvas.hidden = !image;
+  if (!image) return;
+  const { pixels, margin } = image;
+  Drawing.framed(canvas, WHOLE, { height: pixels.length, width: pixels[0].length, grey: (r, c) => pixels[r][c], margin });
 };
 
 // A body at rest, one square per voxel.

@@ -10,7 +10,7 @@ export class Team {
   // Who is in it.
   async load() {
     const { members, classes, class_names } = await get("api/team");
-    this.members = members; this.classes = classes; this.names = Drawing.classNames(class_names);
+    this.members = members; this.classes = classes; this.class_names = class_names; this.names = Drawing.classNames(class_names);
     $("about-team").textContent = `${members.length} robots, each of which tells two groups of classes apart, answer together. Each has one vote for every class of the side it walks to; a walk of at most 3 voxel lengths gives none.`;
   }
 
