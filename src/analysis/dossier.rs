@@ -1,5 +1,6 @@
 //! `morphcog report`: collects the results of runs for a page.
 
+use crate::analysis::comparison::{Comparison, Subject, compare};
 use crate::analysis::progress::Progress;
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
@@ -7,6 +8,7 @@ use crate::base::text::counted;
 use crate::config::Config;
 use crate::data::dataset::Split;
 use crate::images::whereabouts::{Whereabouts, load_dataset_of, stimulus_of};
+use crate::robots::selection::{BEST, Chosen, Selection};
 use crate::search::held_out_run::control_steps;
 use crate::shipped::exists;
 use crate::store::audit::AuditFile;
@@ -16,6 +18,7 @@ use crate::store::folder;
 use crate::store::images::ImageRef;
 use crate::store::names::{CAPACITY_JSON, EVAL_JSON, METRICS, TEAM_JSON};
 use crate::store::run::{Robot, RunFile, different};
+use crate::store::stored_run::StoredRun;
 use crate::store::team::{Member, TeamFile};
 use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::recording::{LabelledStimulus, Recording};
@@ -111,6 +114,8 @@ pub(crate) struct Gathered {
     pub(crate) together: Findings,
     /// Results of `team` for robots of these runs, from there too.
     pub(crate) team: Option<Team>,
+    /// The first run compared with the others; `None` if no other has a task of the first.
+    pub(crate) comparison: Option<Comparison>,
 }
 
 /// Reads runs and the results beside them; unreadable results go to `warn`. Without
@@ -168,6 +173,10 @@ pub(crate) fn gather(
             Findings::read(archives, &all, warn)
         }
     };
+    let comparison = compared(&runs, &together)
+        .map_err(|error| warn(&format!("{error}; left out")))
+        .ok()
+        .flatten();
     let team = match folder::beside_all(archives, TEAM_JSON) {
         path if archives.len() > 1 && path.exists() => {
             let whereabouts = archives
@@ -184,7 +193,47 @@ pub(crate) fn gather(
         runs,
         together,
         team,
+        comparison,
     })
+}
+
+/// Compares the best robots of runs by the tests that there are; nothing is simulated.
+fn compared(runs: &[Dossier], together: &Findings) -> Result<Option<Comparison>, Error> {
+    let tasks = |dossier: &Dossier| dossier.run.dimensions.tasks.clone();
+    let first = runs.first().map(tasks).unwrap_or_default();
+    let is_alike = |dossier: &Dossier| tasks(dossier).iter().any(|task| first.contains(task));
+    if !runs.iter().skip(1).any(is_alike) {
+        return Ok(None);
+    }
+    let mut subjects = Vec::new();
+    for dossier in runs {
+        let tests = [&dossier.findings.eval, &together.eval];
+        subjects.push(Subject {
+            path: &dossier.path,
+            run: &dossier.run,
+            progress: dossier.progress.as_ref(),
+            robots: best(&dossier.path, &dossier.run)?.into_iter().collect(),
+            tests: tests.into_iter().flatten().collect(),
+        });
+    }
+    Ok(Some(compare(&subjects)))
+}
+
+/// Returns the robot of a run that "best" selects; `None` in an empty archive.
+fn best<'a>(path: &Path, run: &'a RunFile) -> Result<Option<&'a Robot>, Error> {
+    if run.elites.is_empty() {
+        return Ok(None);
+    }
+    let source = StoredRun {
+        path: path.to_path_buf(),
+        run: run.clone(),
+    };
+    let best = Selection::Ids(vec![BEST.to_string()]);
+    let chosen = best.of(std::slice::from_ref(&source), 0)?;
+    let is_it =
+        |robot: &&Robot, one: &Chosen| (&robot.id, &robot.task) == (&one.robot.id, &one.robot.task);
+    let first = chosen.first();
+    Ok(first.and_then(|one| run.elites.iter().find(|robot| is_it(robot, one))))
 }
 
 impl Team {

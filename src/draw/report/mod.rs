@@ -2,6 +2,7 @@
 //! played, and test results. It needs no network and works from `file://`.
 
 mod bodies;
+pub(crate) mod comparison;
 pub(crate) mod decisions;
 mod maps;
 pub(crate) mod tables;
@@ -52,6 +53,7 @@ impl Content<'_> {
             runs,
             together,
             team,
+            comparison,
         } = self.gathered;
         let done = AtomicU64::new(0);
         let simulated = || simulated(done.fetch_add(1, Ordering::Relaxed) + 1);
@@ -62,6 +64,9 @@ impl Content<'_> {
         }
         if runs.len() > 1 {
             content += &overview(runs, together);
+        }
+        if let Some(comparison) = comparison {
+            content += &comparison::section(comparison);
         }
         for (number, dossier) in runs.iter().enumerate() {
             content += &run(number, dossier, &rollouts, runs.len() > 1, self.spell);

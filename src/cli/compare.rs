@@ -1,0 +1,75 @@
+//! `morphcog compare`: parses its arguments and runs it.
+
+use crate::base::error::Error;
+use crate::cli::choice::{ROBOTS, Runs, run_jsons, selected};
+use crate::cli::output::comparisons;
+use crate::cli::output::console::Console;
+use crate::cli::values::{seed, threads};
+use crate::cli::{Resources, choice, in_session};
+use crate::commands::compare;
+use crate::commands::compare::CompareOptions;
+use crate::robots::selection::{BEST, Selection};
+use crate::store::images::HowMany;
+use clap::Args;
+use std::path::PathBuf;
+
+pub(super) const EXAMPLES: &str = "\
+Examples:
+  morphcog compare runs/zero_one-seed1 runs/zero_one-seed2
+  # three seeds of one setting, two of another
+  morphcog compare runs/small-seed[123] runs/large-seed[12] \\
+    -o sizes.csv
+  # robots that ship, without a download
+  morphcog compare gallery:zero_one --robots top:1
+
+The first run is compared with each of the others, image by image: a difference is only called one \
+if McNemar's exact test finds it. Runs that differ in nothing but the seed are repetitions, and have \
+a mean and a spread; no others are taken together. Results in eval.json beside a run.json are used \
+if they are of the same images. The figure goes beside the table as SVG and PNG.";
+
+#[derive(Debug, Args)]
+pub(super) struct CompareArgs {
+    /// Two or more runs: each a run.json, or its folder, or runs of the gallery or atlas
+    /// (gallery:zero_one, atlas:zero_one).
+    #[arg(value_name = "ARCHIVE", value_parser = run_jsons(), required = true)]
+    archives: Vec<Runs>,
+    #[arg(short, long, visible_aliases = ["robot", "select"], help = format!("{ROBOTS}; one of each run and task [default: best]"))]
+    robots: Vec<Selection>,
+    /// Only robots that morphcog audit found physical.
+    #[arg(long)]
+    physical_only: bool,
+    /// Number of test images in all, equally many per class; or "all": every image of the classes
+    /// (default: 1000, or all test images if there are fewer).
+    #[arg(short = 'n', long)]
+    images: Option<HowMany>,
+    /// Random seed for drawing images, and robots with random:1.
+    #[arg(long, default_value_t = 1, value_parser = seed())]
+    seed: u64,
+    /// Folder with the images.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// The table (.csv); the figure goes beside it (default: compare.csv above the runs).
+    #[arg(short, long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Threads (default: one per core).
+    #[arg(long, value_parser = threads())]
+    threads: Option<u16>,
+}
+
+pub(super) fn run(args: CompareArgs, console: &Console) -> Result<(), Error> {
+    let archives = args.archives.into_iter();
+    let archives: Vec<PathBuf> = archives.flat_map(|Runs(paths)| paths).collect();
+    let robots = selected(args.robots)?.unwrap_or(Selection::Ids(vec![BEST.to_string()]));
+    choice::say_simulated(&archives, console);
+    let options = CompareOptions {
+        archives,
+        robots: robots.physical(args.physical_only),
+        images: args.images,
+        seed: args.seed,
+        out: args.out,
+    };
+    let with = Resources::of(args.threads, args.data);
+    let outcome = in_session(console, with, |session| compare::compare(&options, session))?;
+    comparisons::comparison(console, &outcome);
+    Ok(())
+}
