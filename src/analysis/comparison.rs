@@ -10,6 +10,7 @@ use crate::base::statistics::{bootstrap, holm, mcnemar, standard_deviation};
 use crate::base::text::counted;
 use crate::config::{Config, Settings, flatten};
 use crate::qd::ArchiveStats;
+use crate::robots::selection::Selection;
 use crate::search::held_out_run::task_of;
 use crate::shipped::exists;
 use crate::store::eval::{EvalFile, RobotReport};
@@ -17,6 +18,8 @@ use crate::store::folder;
 use crate::store::metrics::Moment;
 use crate::store::names::METRICS;
 use crate::store::run::{Robot, RunFile};
+use crate::store::stored_run::StoredRun;
+use crate::store::validation::ranking;
 use crate::task::answer::{Assignment, Direction, is_correct};
 use crate::task::grouping::{ClassSplit, Grouping};
 use serde::Serialize;
@@ -241,26 +244,28 @@ impl<'a> Tested<'a> {
             None
         }
     }
+}
 
-    /// Returns the difference from the first run's robot, its p-value not yet adjusted.
-    fn difference(&self, first: &Tested) -> Option<PairedDifference> {
-        let both = || self.right.iter().zip(&first.right);
-        let count = |only: [bool; 2]| both().filter(|(a, b)| [**a, **b] == only).count();
-        let [only_this, only_first] = [[true, false], [false, true]].map(count);
-        let differences: Vec<f64> = both()
-            .map(|(this, first)| f64::from(u8::from(*this)) - f64::from(u8::from(*first)))
-            .collect();
-        let mean = (only_this as f64 - only_first as f64) / differences.len().max(1) as f64;
-        let p = mcnemar(only_this, only_first);
-        Some(PairedDifference {
-            mean,
-            interval: bootstrap(&[differences])?,
-            only_this,
-            only_first,
-            p,
-            p_adjusted: p,
-        })
-    }
+/// Returns the difference between two robots by their answers to the same images, the p-value not
+/// yet adjusted; `None` for fewer than two images.
+fn difference(this: &[bool], first: &[bool]) -> Option<PairedDifference> {
+    let both = || this.iter().zip(first);
+    let count = |only: [bool; 2]| both().filter(|(a, b)| [**a, **b] == only).count();
+    let [only_this, only_first] = [[true, false], [false, true]].map(count);
+    let right = |answer: bool| f64::from(u8::from(answer));
+    let differences: Vec<f64> = both()
+        .map(|(this, first)| right(*this) - right(*first))
+        .collect();
+    let mean = (only_this as f64 - only_first as f64) / differences.len().max(1) as f64;
+    let p = mcnemar(only_this, only_first);
+    Some(PairedDifference {
+        mean,
+        interval: bootstrap(&[differences])?,
+        only_this,
+        only_first,
+        p,
+        p_adjusted: p,
+    })
 }
 
 /// Compares runs, the first with each of the others.
@@ -331,7 +336,7 @@ fn accuracies(tested: &[Tested]) -> Vec<ComparedAccuracy> {
             accuracy: *accuracy,
             interval: *interval,
             balanced_accuracy: *balanced_accuracy,
-            difference: first.and_then(|first| one.difference(first)),
+            difference: first.and_then(|first| difference(&one.right, &first.right)),
         }
     };
     let mut all: Vec<ComparedAccuracy> = tested.iter().map(of_one).collect();
@@ -430,9 +435,9 @@ fn unknown(subjects: &[Subject], tested: &[Tested], names: &[String]) -> Vec<Str
 }
 
 /// Lists the names of runs, at most a few of them.
-fn listed(runs: impl IntoIterator<Item = usize>, names: &[String]) -> String {
+pub(crate) fn listed(runs: impl IntoIterator<Item = usize>, names: &[impl AsRef<str>]) -> String {
     const MOST: usize = 4;
-    let runs: Vec<&str> = runs.into_iter().map(|run| names[run].as_str()).collect();
+    let runs: Vec<&str> = runs.into_iter().map(|run| names[run].as_ref()).collect();
     match runs.len() {
         0..=MOST => runs.join(", "),
         all => {
@@ -545,6 +550,40 @@ fn summarised(runs: Vec<usize>, subjects: &[Subject], tested: &[Tested]) -> Repe
     Repetitions { runs, quantities }
 }
 
+/// Returns the best robot of each task of a run: the first on validation images if the run ranked
+/// robots by them, else the fittest. Of a run without tasks it is the fittest robot.
+///
+/// # Errors
+/// Returns an error if the archive is empty, a file beside it is not readable, or an audit of
+/// robots that must be physical is missing.
+pub(crate) fn best_of_each_task(
+    source: &StoredRun,
+    physical_only: bool,
+) -> Result<Vec<&Robot>, Error> {
+    let selection = Selection::All.physical(physical_only);
+    let fittest = selection.of(std::slice::from_ref(source), 0)?;
+    let ranked = ranking(source)?.unwrap_or_default();
+    let grouping = source.run.config.grouping()?;
+    let best_of = |split: &ClassSplit| -> Option<&Robot> {
+        let able = || {
+            let all = fittest.iter().map(|one| one.robot);
+            all.filter(|robot| split.is_called(&robot.task))
+        };
+        let with_rank = ranked.iter().filter(|of| split.is_called(&of.task));
+        let with_rank = with_rank
+            .filter_map(|of| Some((able().find(|one| one.id == of.id)?, of.balanced_accuracy)));
+        // On a tie the earlier one stays, which was fitter.
+        let first = with_rank.reduce(|best, one| if one.1 > best.1 { one } else { best });
+        first.map(|(robot, _)| robot).or_else(|| able().next())
+    };
+    let splits = grouping.tasks().iter().filter(|split| !split.is_same_way());
+    let mut best: Vec<&Robot> = splits.filter_map(best_of).collect();
+    if best.is_empty() {
+        best.extend(fittest.first().map(|one| one.robot));
+    }
+    Ok(best)
+}
+
 /// Reads the history of a run; `None` without one.
 ///
 /// # Errors
@@ -553,5 +592,89 @@ pub(crate) fn history(run: &RunFile, archive: &Path) -> Result<Option<Progress>,
     match exists(&archive.with_file_name(METRICS)) {
         true => Progress::of(run, archive).map(Some),
         false => Ok(None),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::samples;
+    use std::path::PathBuf;
+
+    /// Returns answers of which so many are correct, of images from a place on.
+    fn answers(images: usize, from: usize, right: usize) -> Vec<bool> {
+        (0..images)
+            .map(|image| (from..from + right).contains(&image))
+            .collect()
+    }
+
+    #[test]
+    fn what_is_not_significant_is_not_called_a_difference() {
+        let first = answers(100, 0, 80);
+        let of = |this: &[bool]| difference(this, &first).unwrap();
+        let same = of(&first);
+        assert_eq!((same.mean, same.interval, same.p), (0.0, [0.0, 0.0], 1.0));
+        assert_eq!(same.verdict(), "not significant");
+        // Five images more, none less: p = 2/2⁵, though the bootstrap interval excludes 0.
+        let few = of(&answers(100, 0, 85));
+        assert_eq!((few.only_this, few.only_first, few.p), (5, 0, 0.0625));
+        assert!(
+            few.interval[0] > 0.0 && few.verdict() == "not significant",
+            "{few:?}"
+        );
+        assert_eq!(of(&answers(100, 0, 88)).verdict(), "more accurate");
+        assert_eq!(of(&answers(100, 0, 60)).verdict(), "less accurate");
+        // As accurate, but on other images.
+        let other = of(&answers(100, 20, 80));
+        assert_eq!(
+            (other.only_this, other.only_first, other.mean),
+            (20, 20, 0.0)
+        );
+        assert!(other.interval[0] < -0.05 && other.interval[1] > 0.05);
+        assert_eq!(difference(&[true], &[true]), None);
+    }
+
+    #[test]
+    fn only_runs_that_differ_in_nothing_but_the_seed_are_repetitions() {
+        let run = |seed: u64, parents: usize, generations: u64| {
+            let mut run = samples::run(&[("a", 1.0 + seed as f64)]);
+            run.config.seed = seed;
+            run.config.map_elites.parents = parents;
+            run.generations = generations;
+            run
+        };
+        let runs = [
+            run(1, 20, 5),
+            run(2, 40, 5),
+            run(2, 20, 5),
+            run(3, 20, 6),
+            run(2, 20, 5),
+        ];
+        let paths: Vec<PathBuf> = (0..runs.len())
+            .map(|number| PathBuf::from(format!("{number}/run.json")))
+            .collect();
+        let subject = |run, path| Subject {
+            path,
+            run,
+            progress: None,
+            robots: Vec::new(),
+            tests: Vec::new(),
+        };
+        let subjects: Vec<Subject> = runs
+            .iter()
+            .zip(&paths)
+            .map(|(run, path)| subject(run, path))
+            .collect();
+        let found = compare(&subjects);
+        let groups: Vec<&Vec<usize>> = found.repetitions.iter().map(|group| &group.runs).collect();
+        // The last has the seed of one that is in already.
+        assert_eq!(groups, [&vec![0, 2]]);
+        let keys: Vec<&str> = found.keys.iter().map(|key| key.key.as_str()).collect();
+        assert_eq!(keys, ["map_elites.parents", "seed"]);
+        assert_eq!(found.keys[0].texts, ["20", "40", "20", "20", "20"]);
+        let score = &found.repetitions[0].quantities[0];
+        assert_eq!((score.name.as_str(), score.mean), ("QD score", 2.5));
+        assert_eq!((score.least, score.largest), (2.0, 3.0));
+        assert!((score.standard_deviation - 0.5_f64.sqrt()).abs() < 1e-12);
     }
 }

@@ -1,6 +1,6 @@
 //! `morphcog report`: collects the results of runs for a page.
 
-use crate::analysis::comparison::{Comparison, Subject, compare};
+use crate::analysis::comparison::{Comparison, Subject, best_of_each_task, compare};
 use crate::analysis::progress::Progress;
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
@@ -8,7 +8,6 @@ use crate::base::text::counted;
 use crate::config::Config;
 use crate::data::dataset::Split;
 use crate::images::whereabouts::{Whereabouts, load_dataset_of, stimulus_of};
-use crate::robots::selection::{BEST, Chosen, Selection};
 use crate::search::held_out_run::control_steps;
 use crate::shipped::exists;
 use crate::store::audit::AuditFile;
@@ -212,28 +211,28 @@ fn compared(runs: &[Dossier], together: &Findings) -> Result<Option<Comparison>,
             path: &dossier.path,
             run: &dossier.run,
             progress: dossier.progress.as_ref(),
-            robots: best(&dossier.path, &dossier.run)?.into_iter().collect(),
+            robots: best(&dossier.path, &dossier.run)?,
             tests: tests.into_iter().flatten().collect(),
         });
     }
     Ok(Some(compare(&subjects)))
 }
 
-/// Returns the robot of a run that "best" selects; `None` in an empty archive.
-fn best<'a>(path: &Path, run: &'a RunFile) -> Result<Option<&'a Robot>, Error> {
+/// Returns the best robots of a run, one of each task; none of an empty archive.
+fn best<'a>(path: &Path, run: &'a RunFile) -> Result<Vec<&'a Robot>, Error> {
     if run.elites.is_empty() {
-        return Ok(None);
+        return Ok(Vec::new());
     }
     let source = StoredRun {
         path: path.to_path_buf(),
         run: run.clone(),
     };
-    let best = Selection::Ids(vec![BEST.to_string()]);
-    let chosen = best.of(std::slice::from_ref(&source), 0)?;
-    let is_it =
-        |robot: &&Robot, one: &Chosen| (&robot.id, &robot.task) == (&one.robot.id, &one.robot.task);
-    let first = chosen.first();
-    Ok(first.and_then(|one| run.elites.iter().find(|robot| is_it(robot, one))))
+    let best = best_of_each_task(&source, false)?;
+    let own = |best: &Robot| {
+        let is_it = |robot: &&Robot| (&robot.id, &robot.task) == (&best.id, &best.task);
+        run.elites.iter().find(is_it)
+    };
+    Ok(best.into_iter().filter_map(own).collect())
 }
 
 impl Team {

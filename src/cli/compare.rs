@@ -8,7 +8,7 @@ use crate::cli::values::{seed, threads};
 use crate::cli::{Resources, choice, in_session};
 use crate::commands::compare;
 use crate::commands::compare::CompareOptions;
-use crate::robots::selection::{BEST, Selection};
+use crate::robots::selection::Selection;
 use crate::store::images::HowMany;
 use clap::Args;
 use std::path::PathBuf;
@@ -33,7 +33,7 @@ pub(super) struct CompareArgs {
     /// (gallery:zero_one, atlas:zero_one).
     #[arg(value_name = "ARCHIVE", value_parser = run_jsons(), required = true)]
     archives: Vec<Runs>,
-    #[arg(short, long, visible_aliases = ["robot", "select"], help = format!("{ROBOTS}; one of each run and task [default: best]"))]
+    #[arg(short, long, visible_aliases = ["robot", "select"], help = format!("{ROBOTS}; one of each run and task [default: the best of each]"))]
     robots: Vec<Selection>,
     /// Only robots that morphcog audit found physical.
     #[arg(long)]
@@ -59,11 +59,12 @@ pub(super) struct CompareArgs {
 pub(super) fn run(args: CompareArgs, console: &Console) -> Result<(), Error> {
     let archives = args.archives.into_iter();
     let archives: Vec<PathBuf> = archives.flat_map(|Runs(paths)| paths).collect();
-    let robots = selected(args.robots)?.unwrap_or(Selection::Ids(vec![BEST.to_string()]));
+    let robots = selected(args.robots)?;
     choice::say_simulated(&archives, console);
     let options = CompareOptions {
         archives,
-        robots: robots.physical(args.physical_only),
+        robots,
+        physical_only: args.physical_only,
         images: args.images,
         seed: args.seed,
         out: args.out,

@@ -30,8 +30,11 @@ pub(crate) const COMPARE_CSV: &str = "compare.csv";
 pub struct CompareOptions {
     /// The run.json files, two or more; all others are compared with the first.
     pub archives: Vec<PathBuf>,
-    /// The robot of each run, one of each task.
-    pub robots: Selection,
+    /// The robot of each run, one of each task; `None`: the first on validation images if the run
+    /// ranked robots by them, else the fittest.
+    pub robots: Option<Selection>,
+    /// True if only robots count that an audit found physical.
+    pub physical_only: bool,
     /// Number of test images; `None`: 1000, or all test images if there are fewer.
     pub images: Option<HowMany>,
     /// Seed for drawing images, and robots with `random:1`.
@@ -139,11 +142,17 @@ fn opened(options: &CompareOptions) -> Result<Vec<StoredRun>, Error> {
 
 /// Returns the selection of each run's robots; ids may name robots of any of the runs.
 fn selections(options: &CompareOptions, sources: &[StoredRun]) -> Result<Vec<Selection>, Error> {
+    let Some(robots) = &options.robots else {
+        return sources
+            .iter()
+            .map(|source| best_of(options, source))
+            .collect();
+    };
+    let robots = robots.clone().physical(options.physical_only);
+    let is_by_name = |ids: &[String]| ids.iter().all(|id| id != BEST);
     let of_all = match &options.robots {
-        Selection::Ids(ids) if ids.iter().all(|id| id != BEST) => {
-            options.robots.of_each(sources, options.seed)?
-        }
-        robots => vec![Some(robots.clone()); sources.len()],
+        Some(Selection::Ids(ids)) if is_by_name(ids) => robots.of_each(sources, options.seed)?,
+        _ => vec![Some(robots.clone()); sources.len()],
     };
     let named = |(selection, source): (Option<Selection>, &StoredRun)| {
         selection.ok_or_else(|| {
@@ -166,11 +175,22 @@ fn selections(options: &CompareOptions, sources: &[StoredRun]) -> Result<Vec<Sel
                 "expected one robot of each run and task, these are {several} in {}",
                 folder::name(&source.path)
             );
-            let about = options.robots.to_string();
-            return Err(Error::argument("robots", about, text));
+            return Err(Error::argument("robots", &robots, text));
         }
     }
     Ok(selections)
+}
+
+/// Returns the selection of the best robot of each task of a run.
+fn best_of(options: &CompareOptions, source: &StoredRun) -> Result<Selection, Error> {
+    let best = comparison::best_of_each_task(source, options.physical_only)?;
+    Ok(Selection::Drawn {
+        robots: best
+            .into_iter()
+            .map(|robot| (0, robot.id.clone()))
+            .collect(),
+        about: "the best of each task".to_string(),
+    })
 }
 
 /// Describes robots that share a task, if any do.

@@ -495,3 +495,36 @@ pub(crate) fn newest_run() -> Result<PathBuf, Error> {
         error.remedy(Remedy::Run(make, "makes one"))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_short_name_tells_a_run_from_the_others() {
+        let names = |paths: &[&str]| {
+            let paths: Vec<&Path> = paths.iter().map(Path::new).collect();
+            short_names(&paths)
+        };
+        assert_eq!(
+            names(&[
+                "runs/a/run.json",
+                "runs/b/run.json",
+                "gallery:zero_one-1/run.json"
+            ]),
+            ["a", "b", "gallery:zero_one-1"]
+        );
+        assert_eq!(
+            names(&["x/one/a/run.json", "x/two/a/run.json", "x/b/run.json"]),
+            ["one/a", "two/a", "b"]
+        );
+        // Files of one folder; a folder that is the beginning of another.
+        assert_eq!(
+            names(&["x/old.json", "x/run.json", "/a/run.json", "/b/a/run.json"]),
+            ["old.json", "x", "a", "b/a"]
+        );
+        let here = std::env::current_dir().unwrap();
+        let here = here.file_name().unwrap().to_string_lossy();
+        assert_eq!(names(&["run.json"]), [here.as_ref()]);
+    }
+}

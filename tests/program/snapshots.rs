@@ -139,6 +139,7 @@ fn help_reads_as_it_was_reviewed() {
             ("help-response", "response --help"),
             ("help-eval", "eval --help"),
             ("help-audit", "audit --help"),
+            ("help-compare", "compare --help"),
             ("help-capacity", "capacity --help"),
             ("help-team", "team --help"),
             ("help-sweep", "sweep --help"),

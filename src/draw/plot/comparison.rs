@@ -2,6 +2,7 @@
 
 use crate::analysis::comparison::{ComparedAccuracy, ComparedRun, Comparison};
 use crate::base::number;
+use crate::body::Body;
 use crate::draw::colour;
 use crate::draw::colour::Colour;
 use crate::draw::fonts;
@@ -11,11 +12,12 @@ use crate::draw::plot::figure::{Figure, PAGE};
 use crate::draw::plot::progress::pen;
 use crate::draw::plot::robot;
 use crate::store::metrics::Moment;
+use std::ops::Range;
 
 /// Height of a panel of curves, points.
 const PANEL: f64 = 90.0;
 /// Distance between the two panels of a row, points.
-const GAP: f64 = 14.0;
+const GAP: f64 = 24.0;
 /// Height of a line of accuracies, points.
 const LINE: f64 = 11.0;
 /// Largest width of the names of accuracies, points.
@@ -44,6 +46,13 @@ pub(crate) fn comparison(found: &Comparison) -> Figure {
         top = curves(&mut canvas, &found.runs, top) + 10.0;
     }
     top = bodies(&mut canvas, &found.runs, top);
+    let intervals = match found.accuracies.is_empty() {
+        true => "",
+        false => "accuracies with 95 % intervals; ",
+    };
+    let note = format!("{intervals}below each body: robot, task, fitness");
+    let at = [PAGE - MARGIN, top];
+    canvas.text(at, &note, TextStyle::end().colour(colour::FAINT));
     Figure::new(&format!("Comparison: {of}"), [PAGE, top + MARGIN], canvas)
 }
 
@@ -188,11 +197,14 @@ fn curves(canvas: &mut Canvas, runs: &[ComparedRun], top: f64) -> f64 {
 
 /// Draws the runs' robots at one scale, with the lines of the curves; returns the y below.
 fn bodies(canvas: &mut Canvas, runs: &[ComparedRun], top: f64) -> f64 {
-    let sides = runs.iter().filter_map(|run| run.robot.as_ref());
-    let sides = sides.map(|robot| robot.body.height().max(robot.body.width()));
+    let all = || runs.iter().filter_map(|run| run.robot.as_ref());
+    let sides = all().map(|robot| robot.body.height().max(robot.body.width()));
     let cell = BODY / sides.max().unwrap_or(1).max(1) as f64;
-    let tallest = runs.iter().filter_map(|run| run.robot.as_ref());
-    let tallest = tallest.map(|robot| robot.body.height()).max().unwrap_or(0);
+    let heights = all().map(|robot| {
+        let rows = filled_rows(&robot.body);
+        rows.end - rows.start
+    });
+    let tallest = heights.max().unwrap_or(0);
     let width = (PAGE - 2.0 * MARGIN) / BODIES as f64;
     let height = cell * tallest as f64 + CAPTION;
     for (number, run) in runs.iter().enumerate() {
@@ -202,7 +214,7 @@ fn bodies(canvas: &mut Canvas, runs: &[ComparedRun], top: f64) -> f64 {
         let ground = top + cell * tallest as f64;
         if let Some(found) = &run.robot {
             let body = &found.body;
-            let at = [left + 1.0, ground - cell * body.height() as f64];
+            let at = [left + 1.0, ground - cell * filled_rows(body).end as f64];
             let cells = || {
                 let all = body.voxels().iter();
                 all.map(|(place, material)| (place, *material))
@@ -228,8 +240,19 @@ fn bodies(canvas: &mut Canvas, runs: &[ComparedRun], top: f64) -> f64 {
             canvas.fitted([left + 1.0, ground + 20.0], &about, most, faint);
         }
     }
-    let rows = runs.len().div_ceil(BODIES);
-    top + height * rows as f64
+    let bottom = top + height * runs.len().div_ceil(BODIES) as f64;
+    bottom
+}
+
+/// Returns the rows of a body's grid from its first voxel to its last.
+fn filled_rows(body: &Body) -> Range<usize> {
+    let rows = || {
+        let cells = body.voxels().iter();
+        cells
+            .filter(|(_, material)| !material.is_empty())
+            .map(|((row, _), _)| row)
+    };
+    rows().min().unwrap_or(0)..rows().max().map_or(0, |row| row + 1)
 }
 
 #[cfg(test)]

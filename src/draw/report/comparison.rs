@@ -2,7 +2,7 @@
 //! the section of a report.
 
 use crate::analysis::comparison::{
-    ComparedAccuracy, ComparedRun, Comparison, PairedDifference, Quantity, Repetitions,
+    ComparedAccuracy, ComparedRun, Comparison, PairedDifference, Quantity, Repetitions, listed,
 };
 use crate::base::number;
 use crate::base::number::percent;
@@ -141,12 +141,11 @@ fn comparisons(found: &Comparison) -> usize {
 fn repetitions(found: &Comparison) -> Table {
     let headers = ["repetitions", "quantity", "mean", "deviation", "range"];
     let of_group = |group: &Repetitions| {
-        let names: Vec<&str> = group
-            .runs
-            .iter()
-            .map(|&run| found.runs[run].name.as_str())
-            .collect();
-        let names = names.join(", ");
+        let names: Vec<&str> = found.runs.iter().map(|run| run.name.as_str()).collect();
+        let names = match group.runs.len() == names.len() {
+            true => format!("all {} runs", names.len()),
+            false => listed(group.runs.iter().copied(), &names),
+        };
         let row = |quantity: &Quantity| {
             let text = |value: f64| match quantity.is_share {
                 true => percent(value),
@@ -158,7 +157,7 @@ fn repetitions(found: &Comparison) -> Table {
                 format!("{}{unit}", quantity.name),
                 text(quantity.mean),
                 text(quantity.standard_deviation),
-                format!("{}–{}", text(quantity.least), text(quantity.largest)),
+                format!("{} to {}", text(quantity.least), text(quantity.largest)),
             ]
         };
         group.quantities.iter().map(row).collect::<Vec<_>>()
