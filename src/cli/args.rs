@@ -138,7 +138,7 @@ Examples:
     /// Find the smallest networks that are as accurate as the robots.
     #[command(after_help = capacity::EXAMPLES)]
     Capacity(CapacityArgs),
-    /// Compare runs: settings, accuracies on the same images, archives, bodies.
+    /// Compare runs: settings, accuracies, archives, bodies.
     #[command(after_help = compare::EXAMPLES)]
     Compare(CompareArgs),
     /// Make a page about runs: archive, robots to watch, tests, methods.

@@ -1,7 +1,7 @@
 //! `morphcog compare`: parses its arguments and runs it.
 
 use crate::base::error::Error;
-use crate::cli::choice::{ROBOTS, Runs, run_jsons, selected};
+use crate::cli::choice::{Runs, run_jsons, selected};
 use crate::cli::output::comparisons;
 use crate::cli::output::console::Console;
 use crate::cli::values::{seed, threads};
@@ -19,13 +19,13 @@ Examples:
   # three seeds of one setting, two of another
   morphcog compare runs/small-seed[123] runs/large-seed[12] \\
     -o sizes.csv
-  # robots that ship, without a download
-  morphcog compare gallery:zero_one --robots top:1
+  # runs that ship, on all test images
+  morphcog compare gallery:zero_one --images all
 
-The first run is compared with each of the others, image by image: a difference is only called one \
-if McNemar's exact test finds it. Runs that differ in nothing but the seed are repetitions, and have \
-a mean and a spread; no others are taken together. Results in eval.json beside a run.json are used \
-if they are of the same images. The figure goes beside the table as SVG and PNG.";
+The robots of the other runs are compared with those of the first, image by image; McNemar's exact \
+test says whether a difference is significant. Runs that differ in nothing but the seed are \
+repetitions: they have a mean and a spread. No other runs are taken together. Results in an \
+eval.json beside a run.json are reused if they are of the same images.";
 
 #[derive(Debug, Args)]
 pub(super) struct CompareArgs {
@@ -33,7 +33,10 @@ pub(super) struct CompareArgs {
     /// (gallery:zero_one, atlas:zero_one).
     #[arg(value_name = "ARCHIVE", value_parser = run_jsons(), required = true)]
     archives: Vec<Runs>,
-    #[arg(short, long, visible_aliases = ["robot", "select"], help = format!("{ROBOTS}; one of each run and task [default: the best of each]"))]
+    /// Which robot of each run, one of each task: best, top:1, random:1, best-validation:1, or ids
+    /// or beginnings of ids, separated by commas (default: of each task the first on validation
+    /// images if the run ranked robots by them, else the fittest).
+    #[arg(short, long, visible_aliases = ["robot", "select"])]
     robots: Vec<Selection>,
     /// Only robots that morphcog audit found physical.
     #[arg(long)]
@@ -48,7 +51,8 @@ pub(super) struct CompareArgs {
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// The table (.csv); the figure goes beside it (default: compare.csv above the runs).
+    /// The table (.csv); the figure goes beside it as SVG and PNG (default: compare.csv above the
+    /// runs).
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Threads (default: one per core).

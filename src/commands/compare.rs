@@ -119,7 +119,7 @@ fn opened(options: &CompareOptions) -> Result<Vec<StoredRun>, Error> {
         let only = options.archives.first().map(|path| folder::name(path));
         let found = only.map_or("none".to_string(), |name| format!("only {name}"));
         let text = format!("expected two runs or more to compare, found {found}");
-        return Err(Error::usage(text));
+        return Err(Error::usage(text).advice("name another run as well"));
     }
     let sources: Vec<StoredRun> = options
         .archives

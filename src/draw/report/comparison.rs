@@ -6,7 +6,6 @@ use crate::analysis::comparison::{
 };
 use crate::base::number;
 use crate::base::number::percent;
-use crate::base::text::counted;
 use crate::draw::html::escape;
 use crate::draw::plot;
 use crate::draw::report::{figure, tables};
@@ -192,11 +191,9 @@ pub(crate) fn remarks(found: &Comparison) -> Vec<String> {
         );
     }
     if !found.repetitions.is_empty() {
-        let groups = found.repetitions.len();
-        lines.push(format!(
-            "mean and standard deviation over {}; no other runs are taken together",
-            counted(groups, "group of repetitions", "groups of repetitions")
-        ));
+        let text =
+            "repetitions: mean and standard deviation over runs; no others are taken together";
+        lines.push(text.to_string());
     }
     lines.extend(found.notes.iter().cloned());
     lines
