@@ -636,7 +636,7 @@ mod tests {
 
     #[test]
     fn only_runs_that_differ_in_nothing_but_the_seed_are_repetitions() {
-        let run = |seed: u64, parents: usize, generations: u64| {
+        let run = |seed: u64, parents: u16, generations: u64| {
             let mut run = samples::run(&[("a", 1.0 + seed as f64)]);
             run.config.seed = seed;
             run.config.map_elites.parents = parents;

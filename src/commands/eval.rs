@@ -345,6 +345,9 @@ fn common_setting(sources: &[StoredRun]) -> Result<(Config, Grouping), Error> {
     Ok((config, grouping))
 }
 
+/// Robots, and their results on validation images if these chose them.
+type WithScores<'a> = (Vec<Chosen<'a>>, Vec<Validated>);
+
 /// A test without its robots and images.
 struct Opened<'o> {
     sources: Vec<StoredRun>,
@@ -420,7 +423,7 @@ impl<'o> Opened<'o> {
         options: &EvalOptions,
         robots: Vec<Chosen<'a>>,
         session: &'a Session,
-    ) -> Result<Option<(Vec<Chosen<'a>>, Vec<Validated>)>, Error> {
+    ) -> Result<Option<WithScores<'a>>, Error> {
         let Opened {
             sources,
             config,

@@ -182,7 +182,7 @@ fn curves(canvas: &mut Canvas, runs: &[ComparedRun], top: f64) -> f64 {
         for (number, run) in runs.iter().enumerate().rev() {
             let every = run.curve.len().div_ceil(SAMPLES).max(1);
             let end = run.curve.len().saturating_sub(1);
-            let is_drawn = |place: &usize| place % every == 0 || *place == end;
+            let is_drawn = |place: &usize| place.is_multiple_of(every) || *place == end;
             let points = (0..run.curve.len()).filter(is_drawn).map(|place| {
                 let moment = &run.curve[place];
                 plot.place([(moment.generation + 1) as f64, of(moment)])
@@ -240,8 +240,7 @@ fn bodies(canvas: &mut Canvas, runs: &[ComparedRun], top: f64) -> f64 {
             canvas.fitted([left + 1.0, ground + 20.0], &about, most, faint);
         }
     }
-    let bottom = top + height * runs.len().div_ceil(BODIES) as f64;
-    bottom
+    top + height * runs.len().div_ceil(BODIES) as f64
 }
 
 /// Returns the rows of a body's grid from its first voxel to its last.
