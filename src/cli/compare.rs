@@ -16,8 +16,8 @@ use std::path::PathBuf;
 pub(super) const EXAMPLES: &str = "\
 Examples:
   morphcog compare runs/zero_one-seed1 runs/zero_one-seed2
-  # three seeds of one setting, two of another
-  morphcog compare runs/small-seed[123] runs/large-seed[12] \\
+  # seeds of one setting, and of another
+  morphcog compare runs/small-seed* runs/large-seed* \\
     -o sizes.csv
   # runs that ship, on all test images
   morphcog compare gallery:zero_one --images all
@@ -45,6 +45,10 @@ pub(super) struct CompareArgs {
     /// (default: 1000, or all test images if there are fewer).
     #[arg(short = 'n', long)]
     images: Option<HowMany>,
+    /// A dataset other than the runs', such as builtin, whose test images are used: robots of
+    /// different datasets see the same images then.
+    #[arg(long, value_name = "NAME")]
+    dataset: Option<String>,
     /// Random seed for drawing images, and robots with random:1.
     #[arg(long, default_value_t = 1, value_parser = seed())]
     seed: u64,
@@ -70,6 +74,7 @@ pub(super) fn run(args: CompareArgs, console: &Console) -> Result<(), Error> {
         robots,
         physical_only: args.physical_only,
         images: args.images,
+        dataset: args.dataset,
         seed: args.seed,
         out: args.out,
     };

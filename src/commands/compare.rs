@@ -37,6 +37,8 @@ pub struct CompareOptions {
     pub physical_only: bool,
     /// Number of test images; `None`: 1000, or all test images if there are fewer.
     pub images: Option<HowMany>,
+    /// Another dataset than the runs' to take test images from.
+    pub dataset: Option<String>,
     /// Seed for drawing images, and robots with `random:1`.
     pub seed: u64,
     /// Path of the table (CSV); `None`: compare.csv above the runs. The figure (SVG and PNG) goes
@@ -234,7 +236,7 @@ fn tested<'a>(
         seed: options.seed,
         threshold: THRESHOLD,
         cycles: CYCLES,
-        dataset: None,
+        dataset: options.dataset.clone(),
         out: folder::beside(&source.path, eval::own_name(split)),
     };
     let test = eval::measure(&options, session)?;

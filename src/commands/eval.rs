@@ -98,18 +98,7 @@ pub fn eval(options: &EvalOptions, session: &Session) -> Result<EvalOutcome, Err
         steps,
         ..
     } = &opened;
-    if let Some(name) = opened.other {
-        say_transposed(dataset, &config.data.of(name), session);
-    }
-    let size = size_of(&sources[0].run.dataset, &config.data.dataset, dataset);
-    let part = |source: &StoredRun| {
-        part_of_others(&source.run.config, size, dataset, options.split.split())
-    };
-    sources
-        .iter()
-        .find_map(part)
-        .iter()
-        .for_each(|text| session.observer.warning(text));
+    opened.say_images(options, session);
     let robots = skilled(options.robots.of(sources, options.seed)?, grouping, session)?;
     let shown = HeldOutImages::draw(config, sources, dataset, options.draw(config))?;
     let mut report = opened.report(options, &shown);
@@ -180,6 +169,7 @@ pub(crate) fn measure(options: &EvalOptions, session: &Session) -> Result<EvalFi
         steps,
         ..
     } = &opened;
+    opened.say_images(options, session);
     let robots = skilled(options.robots.of(sources, options.seed)?, grouping, session)?;
     let shown = HeldOutImages::draw(config, sources, dataset, options.draw(config))?;
     let mut report = opened.report(options, &shown);
@@ -414,6 +404,26 @@ impl<'o> Opened<'o> {
 
     fn own(&self, splits: &[Split]) -> Result<Dataset, Error> {
         own(&self.sources[0], &self.config, &self.whereabouts, splits)
+    }
+
+    /// Reports what is special about the images: transposed, or of another size than the runs'.
+    fn say_images(&self, options: &EvalOptions, session: &Session) {
+        let Opened {
+            sources,
+            config,
+            dataset,
+            ..
+        } = self;
+        if let Some(name) = self.other {
+            say_transposed(dataset, &config.data.of(name), session);
+        }
+        let size = size_of(&sources[0].run.dataset, &config.data.dataset, dataset);
+        let part = |source: &StoredRun| {
+            part_of_others(&source.run.config, size, dataset, options.split.split())
+        };
+        if let Some(text) = sources.iter().find_map(part) {
+            session.observer.warning(&text);
+        }
     }
 
     /// Returns the robots to test: these, or the best of them on validation images with their

@@ -1,6 +1,6 @@
 //! `compare`: runs side by side, and what may be said about their differences.
 
-use crate::common::program::{Made, Sandbox, TINY};
+use crate::common::program::{Made, Sandbox, TINY, write_images};
 use morphcog::store::eval::EvalFile;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -203,6 +203,35 @@ fn accuracies_of_other_tasks_or_images_are_not_paired_and_the_rest_is_compared()
     }
     assert_eq!(found["repetitions"], json!([]));
     assert_eq!(found["runs"].as_array().unwrap().len(), 3);
+}
+
+#[test]
+fn robots_of_other_data_are_compared_on_the_images_of_one_dataset() {
+    let sandbox = with_runs();
+    write_images(&sandbox, "there/", [28, 28], 1);
+    let evolve = "evolve -q -c walking.toml -g 3 --set data.dataset=mnist --data there";
+    sandbox
+        .run(&format!("{evolve} -o runs/mnist"))
+        .ended(0, &[]);
+    let both = "runs/a2 runs/mnist -n 10";
+    let apart = compared(&sandbox, both);
+    assert!(
+        apart["notes"]
+            .to_string()
+            .contains("mnist: accuracy not paired"),
+        "{apart}"
+    );
+    assert!(apart["accuracies"][1]["difference"].is_null());
+    let together = compared(&sandbox, &format!("{both} --dataset builtin"));
+    assert_eq!(together["notes"], json!([]));
+    assert!(
+        together["accuracies"][1]["difference"].is_object(),
+        "{together}"
+    );
+    // A test without its images says how it can be made.
+    std::fs::remove_dir_all(sandbox.path("there")).unwrap();
+    let said = sandbox.run(&format!("compare {both}"));
+    said.ended(3, &["mnist", "--data", "--dataset"]);
 }
 
 #[test]
