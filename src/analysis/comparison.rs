@@ -31,6 +31,8 @@ const LEVEL: f64 = 0.05;
 
 /// A run to compare, and what is known of it.
 pub(crate) struct Subject<'a> {
+    /// The name in tables and figures.
+    pub(crate) name: String,
     pub(crate) path: &'a Path,
     pub(crate) run: &'a RunFile,
     /// Its history, if it has one.
@@ -270,10 +272,12 @@ fn difference(this: &[bool], first: &[bool]) -> Option<PairedDifference> {
 
 /// Compares runs, the first with each of the others.
 pub(crate) fn compare(subjects: &[Subject]) -> Comparison {
-    let paths: Vec<&Path> = subjects.iter().map(|subject| subject.path).collect();
-    let names = folder::short_names(&paths);
-    let run = |(subject, name): (&Subject, &String)| ComparedRun {
-        name: name.clone(),
+    let names: Vec<&str> = subjects
+        .iter()
+        .map(|subject| subject.name.as_str())
+        .collect();
+    let run = |subject: &Subject| ComparedRun {
+        name: subject.name.clone(),
         archive: folder::name(subject.path),
         seed: subject.run.config.seed,
         generations: subject.run.generations,
@@ -284,7 +288,7 @@ pub(crate) fn compare(subjects: &[Subject]) -> Comparison {
             .map_or(Vec::new(), |found| found.moments.clone()),
         robot: subject.robots.first().map(|robot| (*robot).clone()),
     };
-    let runs: Vec<ComparedRun> = subjects.iter().zip(&names).map(run).collect();
+    let runs: Vec<ComparedRun> = subjects.iter().map(run).collect();
     let tested: Vec<Tested> = subjects
         .iter()
         .enumerate()
@@ -353,7 +357,7 @@ fn accuracies(tested: &[Tested]) -> Vec<ComparedAccuracy> {
 }
 
 /// Says of which runs no accuracy is paired with the first run's, and why.
-fn unpaired(tested: &[Tested], names: &[String]) -> Vec<String> {
+fn unpaired(tested: &[Tested], names: &[&str]) -> Vec<String> {
     let mut reasons: Vec<(&str, BTreeSet<usize>)> = Vec::new();
     let paired: BTreeSet<usize> = tested
         .iter()
@@ -386,7 +390,7 @@ fn unpaired(tested: &[Tested], names: &[String]) -> Vec<String> {
 }
 
 /// Says which runs have no accuracy or no history, and which scores have other meanings.
-fn unknown(subjects: &[Subject], tested: &[Tested], names: &[String]) -> Vec<String> {
+fn unknown(subjects: &[Subject], tested: &[Tested], names: &[&str]) -> Vec<String> {
     let those = |is_one: &dyn Fn(usize, &Subject) -> bool| -> Option<String> {
         let found = subjects.iter().enumerate();
         let found: BTreeSet<usize> = found
@@ -435,14 +439,14 @@ fn unknown(subjects: &[Subject], tested: &[Tested], names: &[String]) -> Vec<Str
 }
 
 /// Lists the names of runs, at most a few of them.
-pub(crate) fn listed(runs: impl IntoIterator<Item = usize>, names: &[impl AsRef<str>]) -> String {
+pub(crate) fn listed(runs: impl IntoIterator<Item = usize>, names: &[&str]) -> String {
     const MOST: usize = 4;
-    let runs: Vec<&str> = runs.into_iter().map(|run| names[run].as_ref()).collect();
+    let runs: Vec<&str> = runs.into_iter().map(|run| names[run]).collect();
     match runs.len() {
-        0..=MOST => runs.join(", "),
+        0..=MOST => runs.join("; "),
         all => {
             let more = counted(all - MOST + 1, "other run", "other runs");
-            format!("{} and {more}", runs[..MOST - 1].join(", "))
+            format!("{} and {more}", runs[..MOST - 1].join("; "))
         }
     }
 }
@@ -654,6 +658,7 @@ mod tests {
             .map(|number| PathBuf::from(format!("{number}/run.json")))
             .collect();
         let subject = |run, path| Subject {
+            name: String::new(),
             path,
             run,
             progress: None,

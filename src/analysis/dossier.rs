@@ -113,8 +113,6 @@ pub(crate) struct Gathered {
     pub(crate) together: Findings,
     /// Results of `team` for robots of these runs, from there too.
     pub(crate) team: Option<Team>,
-    /// The first run compared with the others; `None` if no other has a task of the first.
-    pub(crate) comparison: Option<Comparison>,
 }
 
 /// Reads runs and the results beside them; unreadable results go to `warn`. Without
@@ -172,10 +170,6 @@ pub(crate) fn gather(
             Findings::read(archives, &all, warn)
         }
     };
-    let comparison = compared(&runs, &together)
-        .map_err(|error| warn(&format!("{error}; left out")))
-        .ok()
-        .flatten();
     let team = match folder::beside_all(archives, TEAM_JSON) {
         path if archives.len() > 1 && path.exists() => {
             let whereabouts = archives
@@ -192,12 +186,16 @@ pub(crate) fn gather(
         runs,
         together,
         team,
-        comparison,
     })
 }
 
-/// Compares the best robots of runs by the tests that there are; nothing is simulated.
-fn compared(runs: &[Dossier], together: &Findings) -> Result<Option<Comparison>, Error> {
+/// Compares the first run with the others by the tests that there are, and simulates nothing.
+/// `None` if no other run has a task of the first. `names` are those of the runs.
+pub(crate) fn compared(
+    gathered: &Gathered,
+    names: Vec<String>,
+) -> Result<Option<Comparison>, Error> {
+    let Gathered { runs, together, .. } = gathered;
     let tasks = |dossier: &Dossier| dossier.run.dimensions.tasks.clone();
     let first = runs.first().map(tasks).unwrap_or_default();
     let is_alike = |dossier: &Dossier| tasks(dossier).iter().any(|task| first.contains(task));
@@ -205,9 +203,10 @@ fn compared(runs: &[Dossier], together: &Findings) -> Result<Option<Comparison>,
         return Ok(None);
     }
     let mut subjects = Vec::new();
-    for dossier in runs {
+    for (dossier, name) in runs.iter().zip(names) {
         let tests = [&dossier.findings.eval, &together.eval];
         subjects.push(Subject {
+            name,
             path: &dossier.path,
             run: &dossier.run,
             progress: dossier.progress.as_ref(),

@@ -20,7 +20,7 @@ use crate::store::images::{HeldOut, HowMany};
 use crate::store::run::{Robot, different};
 use crate::store::stored_run::StoredRun;
 use crate::task::answer::THRESHOLD;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The default name of the table; the figure goes beside it.
 pub(crate) const COMPARE_CSV: &str = "compare.csv";
@@ -54,6 +54,16 @@ pub struct ComparisonOutcome {
     pub files: Vec<PathBuf>,
 }
 
+impl ComparisonOutcome {
+    /// Returns the comparison and the paths of the files as one JSON object.
+    pub fn to_json(&self) -> serde_json::Value {
+        let mut all = serde_json::json!(self.comparison);
+        let path = |file: &PathBuf| file.display().to_string();
+        all["files"] = self.files.iter().map(path).collect();
+        all
+    }
+}
+
 /// Compares runs: config keys, held-out accuracies image by image, archives, curves and bodies.
 /// Writes a table and a figure. Results of the same images in an eval.json beside a run are reused.
 ///
@@ -73,9 +83,12 @@ pub fn compare(options: &CompareOptions, session: &Session) -> Result<Comparison
     for (source, selection) in sources.iter().zip(selections) {
         tests.push(tested(options, source, selection, session)?);
     }
-    let known = sources.iter().zip(&progress).zip(&tests);
+    let paths: Vec<&Path> = sources.iter().map(|source| source.path.as_path()).collect();
+    let names = folder::short_names(&paths).into_iter();
+    let known = names.zip(&sources).zip(progress.iter().zip(&tests));
     let subjects: Vec<Subject> = known
-        .map(|((source, progress), tested)| Subject {
+        .map(|((name, source), (progress, tested))| Subject {
+            name,
             path: &source.path,
             run: &source.run,
             progress: progress.as_ref(),

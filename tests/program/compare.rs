@@ -335,7 +335,9 @@ fn a_report_of_several_runs_compares_the_first_with_the_others() {
     };
     assert!(!report("runs/a1").contains("Compared with"));
     let page = report("runs/a1 runs/b1");
-    assert!(page.contains("<h2>Compared with a1</h2>") && page.contains("map_elites.parents"));
+    assert!(
+        page.contains("<h2>Compared with walking, seed 1 (") && page.contains("map_elites.parents")
+    );
     // Only known tests are in a page.
     assert!(page.contains("not tested") && !page.contains("95 % bootstrap"));
     let eval = "eval -q --robots best -n 40 -a";

@@ -8,13 +8,7 @@ use crate::draw::report::comparison::{Table, remarks, tables};
 pub(crate) fn comparison(console: &Console, outcome: &ComparisonOutcome) {
     let ComparisonOutcome { comparison, files } = outcome;
     if console.mode() == Mode::Json {
-        let mut done = serde_json::json!(comparison);
-        let files: Vec<String> = files
-            .iter()
-            .map(|file| file.display().to_string())
-            .collect();
-        done["files"] = files.into();
-        return console.event("compared", &done);
+        return console.event("compared", &outcome.to_json());
     }
     for Table {
         title,

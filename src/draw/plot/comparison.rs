@@ -37,7 +37,7 @@ const SAMPLES: usize = 400;
 pub(crate) fn comparison(found: &Comparison) -> Figure {
     let mut canvas = Canvas::new();
     let names: Vec<&str> = found.runs.iter().map(|run| run.name.as_str()).collect();
-    let of = names.join(", ");
+    let of = names.join("; ");
     let mut top = heading_in_lines(&mut canvas, "Comparison", &of, PAGE, 2) + 4.0;
     if !found.accuracies.is_empty() {
         top = accuracies(&mut canvas, found, top) + 8.0;
@@ -271,7 +271,9 @@ mod tests {
                 .collect();
             let subjects: Vec<Subject> = paths
                 .iter()
-                .map(|path| Subject {
+                .enumerate()
+                .map(|(number, path)| Subject {
+                    name: format!("run{number}"),
                     path,
                     run: &run,
                     progress: None,

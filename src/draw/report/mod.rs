@@ -9,6 +9,7 @@ pub(crate) mod tables;
 mod team;
 mod words;
 
+use crate::analysis::comparison::Comparison;
 use crate::analysis::dossier::{Dossier, Findings, Gathered};
 use crate::base::remedy::Invocation;
 use crate::draw::error::PictureError;
@@ -30,9 +31,16 @@ pub(crate) type Spell<'a> = &'a dyn Fn(&Invocation) -> String;
 #[derive(Clone, Copy)]
 pub(crate) struct Content<'a> {
     pub(crate) gathered: &'a Gathered,
+    /// The first run compared with the others.
+    pub(crate) comparison: Option<&'a Comparison>,
     /// Maximum number of robots of each run that can be played, the fittest first.
     pub(crate) rollouts: usize,
     pub(crate) spell: Spell<'a>,
+}
+
+/// Returns the names of runs on the page.
+pub(crate) fn names(runs: &[Dossier]) -> Vec<String> {
+    runs.iter().map(words::name).collect()
 }
 
 impl Content<'_> {
@@ -53,7 +61,6 @@ impl Content<'_> {
             runs,
             together,
             team,
-            comparison,
         } = self.gathered;
         let done = AtomicU64::new(0);
         let simulated = || simulated(done.fetch_add(1, Ordering::Relaxed) + 1);
@@ -65,7 +72,7 @@ impl Content<'_> {
         if runs.len() > 1 {
             content += &overview(runs, together);
         }
-        if let Some(comparison) = comparison {
+        if let Some(comparison) = self.comparison {
             content += &comparison::section(comparison);
         }
         for (number, dossier) in runs.iter().enumerate() {
