@@ -18,6 +18,8 @@ use std::ops::Range;
 const PANEL: f64 = 90.0;
 /// Distance between the two panels of a row, points.
 const GAP: f64 = 24.0;
+/// Space for the half of a last number that stands beyond its axis, points.
+const LABEL: f64 = 8.0;
 /// Height of a line of accuracies, points.
 const LINE: f64 = 11.0;
 /// Largest width of the names of accuracies, points.
@@ -27,7 +29,7 @@ const BODIES: usize = 6;
 /// Largest side of a body, points.
 const BODY: f64 = 74.0;
 /// Height of the lines below a body, points.
-const CAPTION: f64 = 32.0;
+const CAPTION: f64 = 42.0;
 /// Points of a curve: more would be invisible.
 const SAMPLES: usize = 400;
 
@@ -46,13 +48,11 @@ pub(crate) fn comparison(found: &Comparison) -> Figure {
         top = curves(&mut canvas, &found.runs, top) + 10.0;
     }
     top = bodies(&mut canvas, &found.runs, top);
-    let intervals = match found.accuracies.is_empty() {
-        true => "",
-        false => "accuracies with 95 % intervals; ",
-    };
-    let note = format!("{intervals}below each body: robot, task, fitness");
-    let at = [PAGE - MARGIN, top];
-    canvas.text(at, &note, TextStyle::end().colour(colour::FAINT));
+    if !found.accuracies.is_empty() {
+        let at = [PAGE - MARGIN, top];
+        let note = "bars: 95 % intervals";
+        canvas.text(at, note, TextStyle::end().colour(colour::FAINT));
+    }
     Figure::new(&format!("Comparison: {of}"), [PAGE, top + MARGIN], canvas)
 }
 
@@ -76,7 +76,7 @@ fn accuracies(canvas: &mut Canvas, found: &Comparison, top: f64) -> f64 {
         .fold(0.0, f64::max)
         .min(NAMES);
     let left = MARGIN + widest + 14.0;
-    let width = (PAGE - MARGIN - left - GAP) / 2.0;
+    let width = (PAGE - MARGIN - LABEL - left - GAP) / 2.0;
     let height = LINE * all.len() as f64 + 4.0;
     let lowest = all.iter().map(|one| one.interval[0]).fold(0.9, f64::min);
     let is_paired = all.iter().any(|one| one.difference.is_some());
@@ -164,16 +164,13 @@ fn curves(canvas: &mut Canvas, runs: &[ComparedRun], top: f64) -> f64 {
     let half = (PAGE - 2.0 * MARGIN - GAP) / 2.0;
     for (k, (name, of)) in quantities.into_iter().enumerate() {
         let values = || runs.iter().flat_map(|run| run.curve.iter().map(of));
-        let (low, high) = (
-            values().fold(0.0, f64::min),
-            values().fold(f64::NEG_INFINITY, f64::max),
-        );
+        let (low, high) = (values().fold(0.0, f64::min), values().fold(0.0, f64::max));
         let y = Axis::nice(low, high, 4);
         let space = left_space(y.labels_width());
         let left = MARGIN + k as f64 * (half + GAP) + space;
         let plot = Plot {
             at: [left, top],
-            size: [half - space - 4.0, PANEL],
+            size: [half - space - LABEL, PANEL],
             x: x.clone(),
             y,
         };
@@ -232,12 +229,12 @@ fn bodies(canvas: &mut Canvas, runs: &[ComparedRun], top: f64) -> f64 {
         let name = [left + 16.0, ground + 10.5];
         canvas.fitted(name, &run.name, most - 16.0, TextStyle::default());
         let faint = TextStyle::default().colour(colour::FAINT);
-        let about = run.robot.as_ref().map(|robot| {
-            let fitness = number::fixed(robot.objective, 2);
-            format!("{} {}, {fitness}", robot.id, robot.task)
-        });
-        if let Some(about) = about {
-            canvas.fitted([left + 1.0, ground + 20.0], &about, most, faint);
+        if let Some(robot) = &run.robot {
+            let fitness = format!("fitness {}", number::fixed(robot.objective, 2));
+            let lines = [format!("{} {}", robot.id, robot.task), fitness];
+            for (line, y) in lines.iter().zip([20.0, 29.5]) {
+                canvas.fitted([left + 1.0, ground + y], line, most, faint);
+            }
         }
     }
     top + height * runs.len().div_ceil(BODIES) as f64
