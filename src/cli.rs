@@ -4,6 +4,7 @@ mod args;
 mod audit;
 mod capacity;
 mod choice;
+mod compare;
 mod demo;
 pub mod explain;
 mod import;
@@ -87,6 +88,7 @@ pub(crate) fn run(cli: Cli, console: &Console, ranks: Ranks) -> Result<(), Error
         Command::Team(args) => team::run(args, console),
         Command::Audit(args) => audit::run(args, console, ranks),
         Command::Capacity(args) => capacity::run(args, console),
+        Command::Compare(args) => compare::run(args, console),
         Command::Report(args) => report::run(args, console),
         Command::Sweep(args) => sweep::run(args, console),
         Command::Reproduce(args) => reproduce::run(args, console),

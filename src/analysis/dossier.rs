@@ -1,5 +1,6 @@
 //! `morphcog report`: collects the results of runs for a page.
 
+use crate::analysis::comparison::{Comparison, Subject, best_of_each_task, compare};
 use crate::analysis::progress::Progress;
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
@@ -16,6 +17,7 @@ use crate::store::folder;
 use crate::store::images::ImageRef;
 use crate::store::names::{CAPACITY_JSON, EVAL_JSON, METRICS, TEAM_JSON};
 use crate::store::run::{Robot, RunFile, different};
+use crate::store::stored_run::StoredRun;
 use crate::store::team::{Member, TeamFile};
 use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::recording::{LabelledStimulus, Recording};
@@ -185,6 +187,51 @@ pub(crate) fn gather(
         together,
         team,
     })
+}
+
+/// Compares the first run with the others by the tests that there are, and simulates nothing.
+/// `None` if no other run has a task of the first. `names` are those of the runs.
+pub(crate) fn compared(
+    gathered: &Gathered,
+    names: Vec<String>,
+) -> Result<Option<Comparison>, Error> {
+    let Gathered { runs, together, .. } = gathered;
+    let tasks = |dossier: &Dossier| dossier.run.dimensions.tasks.clone();
+    let first = runs.first().map(tasks).unwrap_or_default();
+    let is_alike = |dossier: &Dossier| tasks(dossier).iter().any(|task| first.contains(task));
+    if !runs.iter().skip(1).any(is_alike) {
+        return Ok(None);
+    }
+    let mut subjects = Vec::new();
+    for (dossier, name) in runs.iter().zip(names) {
+        let tests = [&dossier.findings.eval, &together.eval];
+        subjects.push(Subject {
+            name,
+            path: &dossier.path,
+            run: &dossier.run,
+            progress: dossier.progress.as_ref(),
+            robots: best(&dossier.path, &dossier.run)?,
+            tests: tests.into_iter().flatten().collect(),
+        });
+    }
+    Ok(Some(compare(&subjects)))
+}
+
+/// Returns the best robots of a run, one of each task; none of an empty archive.
+fn best<'a>(path: &Path, run: &'a RunFile) -> Result<Vec<&'a Robot>, Error> {
+    if run.elites.is_empty() {
+        return Ok(Vec::new());
+    }
+    let source = StoredRun {
+        path: path.to_path_buf(),
+        run: run.clone(),
+    };
+    let best = best_of_each_task(&source, false)?;
+    let own = |best: &Robot| {
+        let is_it = |robot: &&Robot| (&robot.id, &robot.task) == (&best.id, &best.task);
+        run.elites.iter().find(is_it)
+    };
+    Ok(best.into_iter().filter_map(own).collect())
 }
 
 impl Team {

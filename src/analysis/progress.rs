@@ -83,7 +83,7 @@ pub(crate) fn group_by_settings(runs: &[Progress]) -> (Vec<String>, Vec<Settings
 }
 
 /// A value of a config for people: groups of classes as 0|1 or cat|dog.
-fn spoken(value: &toml::Value, names: &ClassNames) -> String {
+pub(super) fn spoken(value: &toml::Value, names: &ClassNames) -> String {
     let classes = |list: &toml::Value| -> Option<Vec<u8>> {
         list.as_array()?
             .iter()

@@ -81,9 +81,65 @@ pub(crate) fn bootstrap(clusters: &[Vec<f64>]) -> Option<[f64; 2]> {
     ])
 }
 
+/// Returns the two-sided p-value of McNemar's exact test: of trials that only one of two subjects
+/// passed, `first` and `second` of them, each would be either one's with a probability of one half.
+pub(crate) fn mcnemar(first: usize, second: usize) -> f64 {
+    let discordant = (first + second) as f64;
+    let log_factorial = |count: f64| libm::lgamma(count + 1.0);
+    // Logarithms, since 2ⁿ overflows with a thousand trials.
+    let probability = |count: usize| {
+        let count = count as f64;
+        let ways =
+            log_factorial(discordant) - log_factorial(count) - log_factorial(discordant - count);
+        libm::exp(ways - discordant * std::f64::consts::LN_2)
+    };
+    let tail: f64 = (0..=first.min(second)).map(probability).sum();
+    (2.0 * tail).min(1.0)
+}
+
+/// Adjusts the p-values of several tests, so that the probability of any false positive among them
+/// stays below the level of one (Holm 1979).
+pub(crate) fn holm(values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    let mut adjusted = vec![1.0; values.len()];
+    let mut least = 0.0_f64;
+    for (rank, place) in order.into_iter().enumerate() {
+        least = least.max((values.len() - rank) as f64 * values[place]);
+        adjusted[place] = least.min(1.0);
+    }
+    adjusted
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{bootstrap, standard_deviation, wilson};
+    use super::{bootstrap, holm, mcnemar, standard_deviation, wilson};
+
+    #[test]
+    fn the_exact_test_is_the_textbooks_and_does_not_overflow() {
+        // 2·(1 + 10)/2¹⁰ of one against nine; 2/2⁵ of none against five.
+        for (found, expected) in [
+            (mcnemar(1, 9), 0.021_484_375),
+            (mcnemar(9, 1), 0.021_484_375),
+            (mcnemar(0, 5), 0.0625),
+            (mcnemar(4, 4), 1.0),
+            (mcnemar(0, 0), 1.0),
+        ] {
+            assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        }
+        // The normal approximation with its correction for continuity: z = 199/√4000, p = 0.0017.
+        let many = mcnemar(1900, 2100);
+        assert!((0.0016..0.0018).contains(&many), "{many}");
+    }
+
+    #[test]
+    fn several_tests_are_adjusted_as_holm_does() {
+        let adjusted = holm(&[0.01, 0.04, 0.03, 0.9]);
+        for (found, expected) in adjusted.into_iter().zip([0.04, 0.09, 0.09, 0.9]) {
+            assert!((found - expected).abs() < 1e-12);
+        }
+        assert_eq!((holm(&[0.03]), holm(&[])), (vec![0.03], vec![]));
+    }
 
     #[test]
     fn means_have_a_spread_and_an_interval_that_holds_them() {

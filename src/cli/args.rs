@@ -3,6 +3,7 @@
 use crate::cli::audit::AuditArgs;
 use crate::cli::capacity::CapacityArgs;
 use crate::cli::choice::{Archives, ROBOTS, Runs, run_jsons};
+use crate::cli::compare::CompareArgs;
 use crate::cli::demo::DemoArgs;
 use crate::cli::import::ImportArgs;
 use crate::cli::output::console::Mode;
@@ -17,7 +18,7 @@ use crate::cli::team::TeamArgs;
 use crate::cli::train::TrainArgs;
 use crate::cli::values::{MOST, decimal, held_out, offering, seed, threads, whole};
 use crate::cli::{
-    audit, capacity, demo, plot, report, reproduce, response, serve, sweep, team, train,
+    audit, capacity, compare, demo, plot, report, reproduce, response, serve, sweep, team, train,
 };
 use crate::commands::plan::PAPER_TOML;
 use crate::commands::replay::ShownImage;
@@ -137,6 +138,9 @@ Examples:
     /// Find the smallest networks that are as accurate as the robots.
     #[command(after_help = capacity::EXAMPLES)]
     Capacity(CapacityArgs),
+    /// Compare runs: settings, accuracies, archives, bodies.
+    #[command(after_help = compare::EXAMPLES)]
+    Compare(CompareArgs),
     /// Make a page about runs: archive, robots to watch, tests, methods.
     #[command(after_help = report::EXAMPLES)]
     Report(ReportArgs),
@@ -264,6 +268,7 @@ impl Command {
                 | Command::Team(_)
                 | Command::Audit(_)
                 | Command::Capacity(_)
+                | Command::Compare(_)
                 | Command::Report(_)
                 | Command::Sweep(_)
                 | Command::Reproduce(_)

@@ -27,7 +27,7 @@ use crate::store::folder::check_out;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{EVAL_JSON, EVAL_VALIDATION_JSON};
 use crate::store::results::{self, replaced, write_with_table};
-use crate::store::run::different;
+use crate::store::run::{Robot, RunFile, different};
 use crate::store::stored_run::StoredRun;
 use crate::store::unwritten::Unwritten;
 use crate::store::validation::Validated;
@@ -89,28 +89,16 @@ pub struct EvalOutcome {
 /// # Errors
 /// Returns an error if the archive, data or selection is wrong.
 pub fn eval(options: &EvalOptions, session: &Session) -> Result<EvalOutcome, Error> {
-    let opened = Opened::new(options, session)?;
+    let opened = Opened::new(writable_sources(options)?, options, session)?;
     let Opened {
         sources,
         config,
         grouping,
-        wanted,
         dataset,
         steps,
         ..
     } = &opened;
-    if let Some(name) = opened.other {
-        say_transposed(dataset, &config.data.of(name), session);
-    }
-    let size = size_of(&sources[0].run.dataset, &config.data.dataset, dataset);
-    let part = |source: &StoredRun| {
-        part_of_others(&source.run.config, size, dataset, options.split.split())
-    };
-    sources
-        .iter()
-        .find_map(part)
-        .iter()
-        .for_each(|text| session.observer.warning(text));
+    opened.say_images(options, session);
     let robots = skilled(options.robots.of(sources, options.seed)?, grouping, session)?;
     let shown = HeldOutImages::draw(config, sources, dataset, options.draw(config))?;
     let mut report = opened.report(options, &shown);
@@ -119,34 +107,12 @@ pub fn eval(options: &EvalOptions, session: &Session) -> Result<EvalOutcome, Err
         .filter_map(|Chosen { robot, .. }| Some((robot.task.as_str(), task_of(grouping, robot)?)));
     report.baselines = shown.baselines(sources, tasks)?;
     let walker = || HeldOutRun::new(config, *steps, 0, session);
-    let (robots, scores): (Vec<Chosen>, Vec<Validated>) = match wanted {
-        None => (robots, Vec::new()),
-        Some(wanted) => {
-            // Indices identify validation images, and only in the run's own data.
-            let others = opened
-                .other
-                .map(|_| opened.own(&[Split::Train]))
-                .transpose()?;
-            let of_runs = others.as_ref().unwrap_or(dataset);
-            let best = validation::best_of_runs(
-                sources,
-                &robots,
-                &options.robots,
-                of_runs,
-                grouping,
-                wanted,
-                &walker,
-            )?;
-            let all_know = session.ranks.all(best.is_some());
-            let Some(best) = best.filter(|_| all_know) else {
-                report.stopped = true;
-                return Ok(EvalOutcome {
-                    file: report,
-                    unwritten: None,
-                });
-            };
-            best.into_iter().unzip()
-        }
+    let Some((robots, scores)) = opened.chosen(options, robots, session)? else {
+        report.stopped = true;
+        return Ok(EvalOutcome {
+            file: report,
+            unwritten: None,
+        });
     };
     let (count, images) = (robots.len(), shown.images.len());
     let label = format!(
@@ -178,7 +144,7 @@ pub(crate) fn known(options: &EvalOptions, session: &Session) -> Result<Option<E
     let Ok(known) = EvalFile::read(&options.out) else {
         return Ok(None);
     };
-    let opened = Opened::new(options, session)?;
+    let opened = Opened::new(writable_sources(options)?, options, session)?;
     let shown = HeldOutImages::draw(
         &opened.config,
         &opened.sources,
@@ -189,6 +155,83 @@ pub(crate) fn known(options: &EvalOptions, session: &Session) -> Result<Option<E
         && known.head() == opened.report(options, &shown)
         && is_of_robots(&known, &opened.sources, options)?;
     Ok(is_it.then_some(known))
+}
+
+/// Evaluates robots without writing anything, and without baselines and means. Results of the same
+/// images in the file are taken from there. Fails as [`eval`] does.
+pub(crate) fn measure(options: &EvalOptions, session: &Session) -> Result<EvalFile, Error> {
+    let opened = Opened::new(sources(options)?, options, session)?;
+    let Opened {
+        sources,
+        config,
+        grouping,
+        dataset,
+        steps,
+        ..
+    } = &opened;
+    opened.say_images(options, session);
+    let robots = skilled(options.robots.of(sources, options.seed)?, grouping, session)?;
+    let shown = HeldOutImages::draw(config, sources, dataset, options.draw(config))?;
+    let mut report = opened.report(options, &shown);
+    report.stopped = true;
+    let Some((robots, scores)) = opened.chosen(options, robots, session)? else {
+        return Ok(report);
+    };
+    let is_same = |known: &EvalFile| {
+        let selected = report.selected.clone();
+        let (known, now) = (known.head(), report.head());
+        EvalFile { selected, ..known } == now
+    };
+    let known = EvalFile::read(&options.out).ok().filter(is_same);
+    let known = known.map_or(Vec::new(), |known| known.robots);
+    let known = |run: usize, robot: &Robot| {
+        let is_it = |known: &&RobotReport| {
+            (known.run, &known.id, &known.task) == (run, &robot.id, &robot.task)
+        };
+        known.iter().find(is_it)
+    };
+    let open = robots
+        .iter()
+        .filter(|chosen| known(chosen.source, chosen.robot).is_none());
+    let (open, images) = (open.count(), shown.images.len());
+    if open > 0 {
+        let RunFile { name, config, .. } = &sources[0].run;
+        let robots = counted(open, "robot", "robots");
+        let label = format!("evaluating {robots} of {name}, seed {}:", config.seed);
+        let work = Work::new(label, (open * images) as u64, "rollouts");
+        session.observer.begins(&work);
+    }
+    let walker = HeldOutRun::new(config, *steps, 0, session)?;
+    let mut scores = scores.into_iter();
+    for Chosen { source, robot } in robots {
+        let validation = scores.next();
+        let tested = match known(source, robot) {
+            Some(known) => known.clone(),
+            None => {
+                let run = &sources[source].run;
+                let stimuli = shown.seen_by(&run.config)?;
+                let Some((displacements, simulated)) = walker.rollouts(robot, &stimuli) else {
+                    return Ok(report);
+                };
+                let trial = Trial {
+                    run,
+                    robot,
+                    split: task_of(grouping, robot)
+                        .expect("robots without a task are left out before"),
+                    images: &shown.images,
+                    threshold: options.threshold,
+                };
+                RobotReport::new(&trial, displacements, simulated)
+            }
+        };
+        report.robots.push(RobotReport {
+            run: source,
+            validation,
+            ..tested
+        });
+    }
+    report.stopped = false;
+    Ok(report)
 }
 
 pub(crate) fn settings(file: &EvalFile) -> [(&'static str, String); 8] {
@@ -292,6 +335,9 @@ fn common_setting(sources: &[StoredRun]) -> Result<(Config, Grouping), Error> {
     Ok((config, grouping))
 }
 
+/// Robots, and their results on validation images if these chose them.
+type WithScores<'a> = (Vec<Chosen<'a>>, Vec<Validated>);
+
 /// A test without its robots and images.
 struct Opened<'o> {
     sources: Vec<StoredRun>,
@@ -309,7 +355,11 @@ struct Opened<'o> {
 }
 
 impl<'o> Opened<'o> {
-    fn new(options: &'o EvalOptions, session: &Session) -> Result<Self, Error> {
+    fn new(
+        sources: Vec<StoredRun>,
+        options: &'o EvalOptions,
+        session: &Session,
+    ) -> Result<Self, Error> {
         let threshold = options.threshold;
         if !(0.0..=MOST).contains(&threshold) {
             return Err(Error::argument(
@@ -318,7 +368,6 @@ impl<'o> Opened<'o> {
                 "expected 0 or more voxel lengths",
             ));
         }
-        let sources = sources(options)?;
         let (config, grouping) = common_setting(&sources)?;
         let wanted = wanted(options, &config)?;
         let other = options
@@ -355,6 +404,58 @@ impl<'o> Opened<'o> {
 
     fn own(&self, splits: &[Split]) -> Result<Dataset, Error> {
         own(&self.sources[0], &self.config, &self.whereabouts, splits)
+    }
+
+    /// Reports what is special about the images: transposed, or of another size than the runs'.
+    fn say_images(&self, options: &EvalOptions, session: &Session) {
+        let Opened {
+            sources,
+            config,
+            dataset,
+            ..
+        } = self;
+        if let Some(name) = self.other {
+            say_transposed(dataset, &config.data.of(name), session);
+        }
+        let size = size_of(&sources[0].run.dataset, &config.data.dataset, dataset);
+        let part = |source: &StoredRun| {
+            part_of_others(&source.run.config, size, dataset, options.split.split())
+        };
+        if let Some(text) = sources.iter().find_map(part) {
+            session.observer.warning(&text);
+        }
+    }
+
+    /// Returns the robots to test: these, or the best of them on validation images with their
+    /// results. `None` if stopped.
+    fn chosen<'a>(
+        &'a self,
+        options: &EvalOptions,
+        robots: Vec<Chosen<'a>>,
+        session: &'a Session,
+    ) -> Result<Option<WithScores<'a>>, Error> {
+        let Opened {
+            sources,
+            config,
+            grouping,
+            dataset,
+            ..
+        } = self;
+        let Some(wanted) = &self.wanted else {
+            return Ok(Some((robots, Vec::new())));
+        };
+        // Indices identify validation images, and only in the run's own data.
+        let others = self.other.map(|_| self.own(&[Split::Train])).transpose()?;
+        let of_runs = others.as_ref().unwrap_or(dataset);
+        let walker = || HeldOutRun::new(config, self.steps, 0, session);
+        let selection = &options.robots;
+        let best = validation::best_of_runs(
+            sources, &robots, selection, of_runs, grouping, wanted, &walker,
+        )?;
+        let all_know = session.ranks.all(best.is_some());
+        Ok(best
+            .filter(|_| all_know)
+            .map(|best| best.into_iter().unzip()))
     }
 
     /// Returns the report as it is before the first robot.
@@ -483,6 +584,16 @@ impl Testing<'_> {
 }
 
 /// Reads the runs; checks that they can be tested together and the results written.
+fn writable_sources(options: &EvalOptions) -> Result<Vec<StoredRun>, Error> {
+    let sources = sources(options)?;
+    for source in &sources {
+        check_out(&options.out, &source.path, own_name(options.split))?;
+    }
+    replaced::<EvalFile>(&options.out)?;
+    Ok(sources)
+}
+
+/// Reads the runs; checks that they can be tested together.
 fn sources(options: &EvalOptions) -> Result<Vec<StoredRun>, Error> {
     let sources: Vec<StoredRun> = options
         .archives
@@ -491,7 +602,6 @@ fn sources(options: &EvalOptions) -> Result<Vec<StoredRun>, Error> {
         .collect::<Result<_, _>>()?;
     for source in &sources {
         source.has_task()?;
-        check_out(&options.out, &source.path, own_name(options.split))?;
         same_setting(&sources[0], source)?;
     }
     different(
@@ -499,7 +609,6 @@ fn sources(options: &EvalOptions) -> Result<Vec<StoredRun>, Error> {
             .iter()
             .map(|source| (source.path.as_path(), &source.run)),
     )?;
-    replaced::<EvalFile>(&options.out)?;
     Ok(sources)
 }
 

@@ -5,6 +5,8 @@ pub mod audit;
 pub mod bench;
 pub mod capacity;
 pub(crate) mod collect;
+#[cfg(feature = "figures")]
+pub mod compare;
 pub mod data;
 pub mod eval;
 pub mod evolve;

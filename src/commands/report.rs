@@ -6,7 +6,7 @@ use crate::base::number;
 use crate::base::observer::Work;
 use crate::base::session::Session;
 use crate::draw::error::write_whole;
-use crate::draw::report::{Content, Spell};
+use crate::draw::report::{Content, Spell, names};
 use crate::store::folder;
 use std::path::PathBuf;
 
@@ -33,8 +33,13 @@ pub(crate) fn report(options: &ReportOptions, session: &Session) -> Result<(), E
     let warn = |text: &str| session.observer.warning(text);
     let gathered = dossier::gather(archives, session.data_folder(), options.rollouts > 0, &warn)?;
     let rollouts = options.rollouts.div_ceil(archives.len());
+    let comparison = dossier::compared(&gathered, names(&gathered.runs))
+        .map_err(|error| warn(&format!("{error}; left out")))
+        .ok()
+        .flatten();
     let content = Content {
         gathered: &gathered,
+        comparison: comparison.as_ref(),
         rollouts,
         spell: *spell,
     };

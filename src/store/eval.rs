@@ -305,7 +305,7 @@ impl EvalFile {
             program_version: env!("CARGO_PKG_VERSION").to_string(),
             run: first.map_or(String::new(), |run| run.name.clone()),
             run_seed: first.map_or(0, |run| run.config.seed),
-            runs: sources.iter().map(RunRef::of).collect(),
+            runs: RunRef::of_all(sources),
             setting: first.map(|run| RunSetting {
                 stimulus: together.stimulus,
                 task: together.task.clone(),
@@ -355,7 +355,14 @@ impl EvalFile {
         })
     }
 
-    /// Returns the file without results, and without names of classes, on which none depends.
+    /// Returns the name of a robot's run in tables; `None` unless there are several runs.
+    pub(crate) fn run_of(&self, robot: &RobotReport) -> Option<&str> {
+        let run = self.runs.get(robot.run).filter(|_| self.runs.len() > 1)?;
+        Some(run.in_tables())
+    }
+
+    /// Returns the file without results, and without names of classes and folders, on which none
+    /// depends.
     pub(crate) fn head(&self) -> Self {
         let nameless = |setting: RunSetting| RunSetting {
             data: DataConfig {
@@ -364,12 +371,17 @@ impl EvalFile {
             },
             ..setting
         };
+        let nowhere = |run: &RunRef| RunRef {
+            folder: None,
+            ..run.clone()
+        };
         EvalFile {
             stopped: false,
             setting: self.setting.clone().map(nameless),
             baselines: BTreeMap::new(),
             means: BTreeMap::new(),
             robots: Vec::new(),
+            runs: self.runs.iter().map(nowhere).collect(),
             ..self.clone()
         }
     }
@@ -427,7 +439,7 @@ impl EvalFile {
         serde_json::to_string(self).expect("JSON has all of it") + "\n"
     }
 
-    /// Encodes `eval.csv`: a line per robot.
+    /// Encodes `eval.csv`: a line per robot; it begins with the run if there are several.
     pub(crate) fn to_csv(&self) -> Vec<u8> {
         let classes: Vec<u8> = self.robots.first().map_or(Vec::new(), |robot| {
             robot.per_class.keys().copied().collect()
@@ -447,7 +459,9 @@ impl EvalFile {
             "accuracy_high",
             "balanced_accuracy",
         ];
-        let columns = about.into_iter().chain(shares).map(str::to_string);
+        let run = (self.runs.len() > 1).then_some("run");
+        let columns = run.into_iter().chain(about).chain(shares);
+        let columns = columns.map(str::to_string);
         let columns = columns.chain(classes.iter().map(|class| format!("accuracy_{class}")));
         let columns = columns
             .chain(["mean_distance", "not_moved", "unstable", "simulated"].map(str::to_string));
@@ -456,7 +470,10 @@ impl EvalFile {
                 .runs
                 .get(robot.run)
                 .map_or(self.run_seed, |run| run.seed);
+            // A list of one or none fills as many columns.
+            let run: Vec<&str> = self.run_of(robot).into_iter().collect();
             let about = (
+                run,
                 &robot.id,
                 seed,
                 &robot.task,

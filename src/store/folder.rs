@@ -17,7 +17,7 @@ use crate::store::names::{
 };
 use crate::store::run::RunFile;
 use std::ffi::OsStr;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// The default folder of runs, in the current folder.
 pub const RUNS: &str = "runs";
@@ -391,6 +391,49 @@ pub fn name(run_json: &Path) -> String {
     full_name(run_json).unwrap_or_else(|| run_json.display().to_string())
 }
 
+/// Returns a short name of each run for tables: its folder's name, with as many of the folders above
+/// as tell it from the others, or its full name if it ships.
+pub(crate) fn short_names(archives: &[&Path]) -> Vec<String> {
+    let parts: Vec<Vec<String>> = archives.iter().map(|path| name_parts(path)).collect();
+    let mut depths = vec![1; parts.len()];
+    loop {
+        let named = |(parts, depth): (&Vec<String>, &usize)| {
+            parts[parts.len().saturating_sub(*depth)..].join("/")
+        };
+        let names: Vec<String> = parts.iter().zip(&depths).map(named).collect();
+        let is_taken = |name: &String| names.iter().filter(|other| *other == name).count() > 1;
+        let longer = (0..names.len())
+            .filter(|&place| is_taken(&names[place]) && depths[place] < parts[place].len());
+        let longer: Vec<usize> = longer.collect();
+        if longer.is_empty() {
+            return names;
+        }
+        longer.into_iter().for_each(|place| depths[place] += 1);
+    }
+}
+
+/// Returns the folders of a run from the root, and its file's name if that is not the usual one.
+fn name_parts(run_json: &Path) -> Vec<String> {
+    if let Some(name) = full_name(run_json) {
+        return vec![name];
+    }
+    let is_above = |part: Component| part == Component::ParentDir;
+    let absolute = match run_json.components().any(is_above) {
+        true => run_json.canonicalize(),
+        false => std::path::absolute(run_json),
+    };
+    let absolute = absolute.unwrap_or_else(|_| run_json.to_path_buf());
+    let name = |part: Component| match part {
+        Component::Normal(name) => Some(name.to_string_lossy().into_owned()),
+        _ => None,
+    };
+    let mut parts: Vec<String> = absolute.components().filter_map(name).collect();
+    if parts.len() > 1 && parts.last().is_some_and(|file| file == RUN_JSON) {
+        parts.pop();
+    }
+    parts
+}
+
 /// Returns the default path of a run's results: beside its run.json, or here for a shipped run.
 pub fn beside(archive: &Path, name: &str) -> PathBuf {
     match shipped::name(archive) {
@@ -451,4 +494,37 @@ pub(crate) fn newest_run() -> Result<PathBuf, Error> {
         let error = Error::input("there is no run under runs/".to_string()).remedy(Remedy::NameRun);
         error.remedy(Remedy::Run(make, "makes one"))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_short_name_tells_a_run_from_the_others() {
+        let names = |paths: &[&str]| {
+            let paths: Vec<&Path> = paths.iter().map(Path::new).collect();
+            short_names(&paths)
+        };
+        assert_eq!(
+            names(&[
+                "runs/a/run.json",
+                "runs/b/run.json",
+                "gallery:zero_one-1/run.json"
+            ]),
+            ["a", "b", "gallery:zero_one-1"]
+        );
+        assert_eq!(
+            names(&["x/one/a/run.json", "x/two/a/run.json", "x/b/run.json"]),
+            ["one/a", "two/a", "b"]
+        );
+        // Files of one folder; a folder that is the beginning of another.
+        assert_eq!(
+            names(&["x/old.json", "x/run.json", "/a/run.json", "/b/a/run.json"]),
+            ["old.json", "x", "a", "b/a"]
+        );
+        let here = std::env::current_dir().unwrap();
+        let here = here.file_name().unwrap().to_string_lossy();
+        assert_eq!(names(&["run.json"]), [here.as_ref()]);
+    }
 }

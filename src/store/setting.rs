@@ -17,6 +17,7 @@ use crate::task::protocol::Protocol;
 use crate::task::stimulus::StimulusParams;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// A run that contributed robots.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -34,6 +35,9 @@ pub struct RunRef {
     /// The name for `--archive`, if the run has a name in place of a path.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) archive: Option<String>,
+    /// The name in tables, if there are several runs: that of its folder, or of a run that ships.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) folder: Option<String>,
 }
 
 /// The settings that give networks the same images as the robots.
@@ -52,7 +56,19 @@ pub struct RunSetting {
 }
 
 impl RunRef {
-    pub(crate) fn of(source: &StoredRun) -> Self {
+    /// Describes runs that are tested together.
+    pub(crate) fn of_all(sources: &[StoredRun]) -> Vec<Self> {
+        let paths: Vec<&Path> = sources.iter().map(|source| source.path.as_path()).collect();
+        let folders = (sources.len() > 1).then(|| folder::short_names(&paths));
+        let mut folders = folders.into_iter().flatten();
+        let of = |source| RunRef {
+            folder: folders.next(),
+            ..RunRef::of(source)
+        };
+        sources.iter().map(of).collect()
+    }
+
+    fn of(source: &StoredRun) -> Self {
         let run = &source.run;
         RunRef {
             name: run.name.clone(),
@@ -61,7 +77,13 @@ impl RunRef {
             training_images: run.training_images.clone(),
             sha256: run.fingerprint(),
             archive: folder::full_name(&source.path),
+            folder: None,
         }
+    }
+
+    /// Returns the name in tables; earlier versions did not record the folder.
+    pub(crate) fn in_tables(&self) -> &str {
+        self.folder.as_deref().unwrap_or(&self.name)
     }
 }
 

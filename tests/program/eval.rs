@@ -154,6 +154,52 @@ fn an_evaluation_adds_up() {
 }
 
 #[test]
+fn robots_of_several_runs_are_told_apart_by_the_folders_of_these() {
+    let sandbox = with_run();
+    for (folder, seed) in [("x/run", 5), ("other", 6)] {
+        let evolve = format!("evolve -q -c tiny.toml --seed {seed} -o {folder}");
+        sandbox.run(&evolve).ended(0, &[]);
+    }
+    let eval = "eval -a run x/run other -n 4 --cycles 1 --robots top:9";
+    let said = sandbox.run(eval).ended(0, &[]);
+    let header = said
+        .out
+        .lines()
+        .find(|line| line.contains("robot"))
+        .unwrap();
+    assert!(header.trim_start().starts_with("run "), "{header}");
+    let report: EvalFile = serde_json::from_str(&sandbox.read("eval.json")).unwrap();
+    let text = sandbox.read("eval.csv");
+    let mut csv = csv::Reader::from_reader(text.as_bytes());
+    assert_eq!(&csv.headers().unwrap()[0], "run");
+    let lines: Vec<BTreeMap<String, String>> = csv.deserialize().map(Result::unwrap).collect();
+    // Two folders are called `run`.
+    let folder = sandbox.path("");
+    let above = folder.file_name().unwrap().to_str().unwrap();
+    let names = [
+        format!("{above}/run"),
+        "x/run".to_string(),
+        "other".to_string(),
+    ];
+    let seeds = [3, 5, 6];
+    assert_eq!(lines.len(), 9);
+    for (line, robot) in lines.iter().zip(&report.robots) {
+        assert_eq!(line["run"], names[robot.run]);
+        assert!(said.out.contains(&names[robot.run]), "{said:?}");
+        assert_eq!(line["run_seed"], seeds[robot.run].to_string());
+    }
+    let json = sandbox
+        .run(&format!("{eval} --json"))
+        .ended(0, &[])
+        .json_lines();
+    assert_eq!(json.last().unwrap()["runs"], serde_json::json!(names));
+    // The run of a single archive needs no column.
+    sandbox.run("eval -a run -n 4 --cycles 1").ended(0, &[]);
+    assert!(sandbox.read("run/eval.csv").starts_with("id,run_seed,"));
+    assert!(!sandbox.read("run/eval.json").contains("\"folder\""));
+}
+
+#[test]
 fn held_out_images_are_the_same_for_the_same_seed_and_others_for_another() {
     let sandbox = with_run();
     let images = |seed: u32| {

@@ -5,7 +5,7 @@ use morphcog::commands::plan::PAPER_TOML;
 use morphcog::commands::schema;
 use morphcog::config::BUILT_IN;
 
-const COMMANDS: [&str; 26] = [
+const COMMANDS: [&str; 27] = [
     "",
     "evolve",
     "response",
@@ -14,6 +14,7 @@ const COMMANDS: [&str; 26] = [
     "team",
     "audit",
     "capacity",
+    "compare",
     "sweep",
     "reproduce",
     "report",

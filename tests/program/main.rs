@@ -5,6 +5,7 @@ mod common;
 
 mod audit;
 mod capacity;
+mod compare;
 mod configs;
 mod data;
 mod eval;

@@ -400,6 +400,7 @@ fn every_event_of_json_is_documented_with_its_fields() {
         "capacity --eval run/eval.json --set trainings=2 --set sizes=[1,3]",
         "team -a run --classes 0,1 --images 4",
         "replay -a run --format png",
+        "compare run taught -n 4 -o compare.csv",
         "report run --rollouts 0",
         "data info",
         "data sheet",

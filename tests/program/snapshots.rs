@@ -139,6 +139,7 @@ fn help_reads_as_it_was_reviewed() {
             ("help-response", "response --help"),
             ("help-eval", "eval --help"),
             ("help-audit", "audit --help"),
+            ("help-compare", "compare --help"),
             ("help-capacity", "capacity --help"),
             ("help-team", "team --help"),
             ("help-sweep", "sweep --help"),
@@ -160,6 +161,8 @@ fn results_read_as_they_were_reviewed() {
     let sandbox = with_run();
     sandbox.write("plan.toml", "config = \"tiny.toml\"\nseeds = [1, 2]\n");
     write_pictures(&sandbox, "photos", 6);
+    let other = "evolve -q -c tiny.toml -o other --set seed=4 --set map_elites.parents=9";
+    sandbox.run(other).ended(0, &[]);
     check_all(
         &sandbox,
         &[
@@ -172,6 +175,7 @@ fn results_read_as_they_were_reviewed() {
                 "audit",
                 "audit -q -a run --robots top:1 --threads 1 --set perturbations.time_step=[2]",
             ),
+            ("compare", "compare -q run other -n 20 --threads 1"),
             ("gallery", "gallery"),
             ("data-info", "data info builtin"),
             ("data-import", "data import photos --name shapes"),
@@ -302,6 +306,15 @@ fn errors_of_single_commands_read_as_they_were_reviewed() {
             &commands.iter().map(String::as_str).collect::<Vec<_>>(),
         )
     };
+    let compare_with = [
+        "",
+        "run",
+        "nowhere",
+        "gallery:zero_one-1 -o table.json",
+        "gallery:zero_one-1 -o run/metrics.csv",
+        "gallery:zero_one-1 --robots top:2",
+        "gallery:zero_one-1 --physical-only",
+    ];
     let capacity = [
         "--set sizes=[1,4,9]",
         "--set sizes=[3,2]",
@@ -403,6 +416,7 @@ fn errors_of_single_commands_read_as_they_were_reviewed() {
         ("errors-response", all("response -q -a run", &response)),
         ("errors-team", all("team -q -a run", &team)),
         ("errors-audit", all("audit -a run", &audit)),
+        ("errors-compare", all("compare -q run", &compare_with)),
         ("errors-sweep", all("sweep", &sweep)),
         ("errors-pictures", all_told(&sandbox, &pictures)),
     ]);

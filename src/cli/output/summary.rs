@@ -27,6 +27,7 @@ use crate::store::eval::{EvalFile, RobotReport};
 use crate::store::images::{HeldOut, ImageRef};
 use crate::store::names::RUN_JSON;
 use crate::store::run::RunFile;
+use crate::store::setting::RunRef;
 use crate::store::validation::Validated;
 use crate::task::class_names::ClassNames;
 use crate::task::gates::class_of_three;
@@ -361,6 +362,10 @@ pub(crate) fn evaluation(
             "means": report.means, "baselines": report.baselines,
             "robots": report.robots.iter().map(RobotReport::without_displacements).collect::<Vec<_>>(),
         });
+        if report.runs.len() > 1 {
+            let runs: Vec<&str> = report.runs.iter().map(RunRef::in_tables).collect();
+            done["runs"] = serde_json::json!(runs);
+        }
         let class_names = report.names();
         if !class_names.all().is_empty() {
             done["class_names"] = serde_json::json!(class_names.all());
@@ -372,20 +377,25 @@ pub(crate) fn evaluation(
     let names: Vec<String> = classes
         .map(|class| format!("% of {}", class_names.name(*class)))
         .collect();
-    let mut headers = vec![
+    let mut headers: Vec<&str> = (report.runs.len() > 1)
+        .then_some("run")
+        .into_iter()
+        .collect();
+    headers.extend([
         "robot",
         "task",
         "fitness",
         "accuracy %",
         "95 % interval",
         "balanced %",
-    ];
+    ]);
     headers.extend(names.iter().map(String::as_str));
     headers.extend(["mean |d|", "not moved %", "unstable", "rollouts"]);
     let validated = report.robots.iter().any(|robot| robot.validation.is_some());
     headers.extend(validated.then_some("validated %"));
     let rows = report.robots.iter().map(|robot| {
-        let mut row = of_robot(robot);
+        let run = report.run_of(robot).map(str::to_string);
+        let mut row: Vec<String> = run.into_iter().chain(of_robot(robot)).collect();
         row.extend(robot.per_class.values().map(|share| percent(*share)));
         row.extend([
             number::fixed(robot.mean_distance, 1),

@@ -129,9 +129,9 @@ fn end(group: &SettingsGroup) -> f64 {
     if shortest.is_finite() { shortest } else { 0.0 }
 }
 
-/// Returns the line style of a group: a colour, other dashes once the colours are used up, and gray
+/// Returns the line style of a group or run: a colour, other dashes once the colours are used up, and gray
 /// for groups without a name.
-fn pen(number: usize) -> Pen {
+pub(super) fn pen(number: usize) -> Pen {
     let colour = scales::SET[number % scales::SET.len()];
     match DASHES.get(number / scales::SET.len()) {
         Some(dashes) => Pen {

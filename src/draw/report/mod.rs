@@ -2,12 +2,14 @@
 //! played, and test results. It needs no network and works from `file://`.
 
 mod bodies;
+pub(crate) mod comparison;
 pub(crate) mod decisions;
 mod maps;
 pub(crate) mod tables;
 mod team;
 mod words;
 
+use crate::analysis::comparison::Comparison;
 use crate::analysis::dossier::{Dossier, Findings, Gathered};
 use crate::base::remedy::Invocation;
 use crate::draw::error::PictureError;
@@ -29,9 +31,16 @@ pub(crate) type Spell<'a> = &'a dyn Fn(&Invocation) -> String;
 #[derive(Clone, Copy)]
 pub(crate) struct Content<'a> {
     pub(crate) gathered: &'a Gathered,
+    /// The first run compared with the others.
+    pub(crate) comparison: Option<&'a Comparison>,
     /// Maximum number of robots of each run that can be played, the fittest first.
     pub(crate) rollouts: usize,
     pub(crate) spell: Spell<'a>,
+}
+
+/// Returns the names of runs on the page.
+pub(crate) fn names(runs: &[Dossier]) -> Vec<String> {
+    runs.iter().map(words::name).collect()
 }
 
 impl Content<'_> {
@@ -62,6 +71,9 @@ impl Content<'_> {
         }
         if runs.len() > 1 {
             content += &overview(runs, together);
+        }
+        if let Some(comparison) = self.comparison {
+            content += &comparison::section(comparison);
         }
         for (number, dossier) in runs.iter().enumerate() {
             content += &run(number, dossier, &rollouts, runs.len() > 1, self.spell);
