@@ -160,7 +160,7 @@ Examples:
   morphcog replay --robot best-validation:1
   morphcog replay --robot best -o walk.gif")]
     Replay(ReplayArgs),
-    /// Make a figure: SVG and PNG for papers and pages.
+    /// Make a figure: SVG, PNG and PDF for papers and pages.
     #[command(after_help = plot::EXAMPLES)]
     Plot(PlotArgs),
     /// Simulate any body with any stimuli.

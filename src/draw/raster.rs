@@ -2,10 +2,11 @@
 
 use crate::draw::colour::Colour;
 use crate::draw::error::{PictureError, write_whole};
+use crate::draw::fonts::EMBEDDED;
 use crate::draw::scene::Primitive;
 use crate::draw::stage::Stage;
 use crate::draw::walk::Walk;
-use crate::draw::{fonts, panel, scene};
+use crate::draw::{panel, scene};
 use std::path::Path;
 use tiny_skia::{FillRule, LineCap, LineJoin, Paint, PathBuilder, Pixmap, Stroke, Transform};
 
@@ -64,7 +65,7 @@ pub(crate) fn draw(
                 bold,
                 colour,
             } => {
-                if let (Some(path), _) = fonts::letters(text, *size, *bold) {
+                if let (Some(path), _) = EMBEDDED.letters(text, *size, *bold) {
                     let [x, y] = place(at);
                     let (paint, there) = (paint(*colour, true), Transform::from_translate(x, y));
                     pixmap.fill_path(&path, &paint, FillRule::Winding, there, None);

@@ -8,7 +8,8 @@ use crate::draw::colour;
 use crate::draw::colour::Colour;
 use crate::draw::plot::axes::{Axis, MARGIN, colour_bar, heading};
 use crate::draw::plot::canvas::{Canvas, Pen, Piece, TEXT, TextStyle};
-use crate::draw::plot::figure::{COLUMN, Figure, PAGE};
+use crate::draw::plot::figure::Figure;
+use crate::draw::plot::style::Style;
 use crate::draw::plot::svg::number;
 use crate::draw::plot::{robot, scales};
 use crate::qd::descriptor::{COUNT_BINS, DescriptorSpace, count_bin, possible_cells};
@@ -22,11 +23,14 @@ const BELOW: f64 = 24.0;
 const STRIPS: [&str; 2] = ["strips in a square:", "total voxels, few to many"];
 
 /// Plots the fitness of the elites of a run, one map per task.
-pub fn archive(run: &RunFile) -> Figure {
+pub fn archive(run: &RunFile, style: &Style) -> Figure {
     let tasks = run.dimensions.tasks.len().max(1);
     let scale = Scale::of(run);
-    let mut canvas = Canvas::new();
-    let (columns, width) = if tasks == 1 { (1, COLUMN) } else { (4, PAGE) };
+    let mut canvas = Canvas::new(style);
+    let (columns, width) = match tasks {
+        1 => (1, style.column()),
+        _ => (style.panels(4), style.page()),
+    };
     let of = format!(
         "{}, seed {}, generation {}; {} of {} cells",
         run.name,
@@ -257,10 +261,10 @@ fn legend(canvas: &mut Canvas, [x, y]: [f64; 2], width: f64, scale: &Scale, is_a
     let name = scale
         .unit
         .map_or("fitness".to_string(), |unit| format!("fitness [{unit}]"));
-    colour_bar(
+    let y = y + colour_bar(
         canvas,
         [x, y + 4.0],
-        width - 6.0,
+        [width - 6.0, width],
         &scale.right,
         &name,
         |value| scale.colour(value),
