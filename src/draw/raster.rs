@@ -124,10 +124,13 @@ pub(crate) fn paint(colour: Colour, smooth: bool) -> Paint<'static> {
 
 /// Writes a picture as PNG, atomically.
 pub(crate) fn write_png(path: &Path, picture: &Pixmap) -> Result<(), PictureError> {
-    let bytes = picture
+    write_whole(path, &png_bytes(picture)?)
+}
+
+pub(crate) fn png_bytes(picture: &Pixmap) -> Result<Vec<u8>, PictureError> {
+    picture
         .encode_png()
-        .map_err(|e| PictureError::Encode(e.to_string()))?;
-    write_whole(path, &bytes)
+        .map_err(|e| PictureError::Encode(e.to_string()))
 }
 
 #[cfg(test)]

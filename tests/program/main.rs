@@ -8,6 +8,7 @@ mod capacity;
 mod configs;
 mod data;
 mod eval;
+mod film;
 mod full_disk;
 mod gaits;
 mod gates;

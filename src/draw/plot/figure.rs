@@ -266,6 +266,7 @@ mod tests {
                     .1
                     .strip_suffix('>')
             })
+            .filter(|letter| *letter != "FFFF")
             .collect();
         let expected: Vec<String> = "a <b&c"
             .chars()
