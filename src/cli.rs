@@ -366,7 +366,8 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
         open,
         ..
     } = args;
-    let (width, every, fps, look) = (args.width, usize::from(args.every), args.fps, args.look);
+    let (width, fps, look) = (args.width, args.fps, args.look);
+    let every = args.every.map(usize::from);
     // Wrong file names and formats must be reported before the simulation starts.
     let named = out
         .as_deref()

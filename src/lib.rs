@@ -117,7 +117,7 @@
 //! let run = RunFile::read(Path::new("gallery:zero_one-1/run.json"))?;
 //! let best = run.best().ok_or("the archive is empty")?;
 //! println!("robot {} performs {}: {}", best.id, best.task, best.body);
-//! let svg = plot::archive(&run).svg();
+//! let svg = plot::archive(&run, &plot::Style::default()).svg();
 //! assert!(svg.starts_with("<svg"));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

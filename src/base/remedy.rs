@@ -50,6 +50,8 @@ pub enum Remedy {
     ChoosePort,
     /// Name one robot, for example this one.
     NameRobot(String),
+    /// Write the single pictures of a film, for another encoder.
+    WriteFrames,
     /// Free space on the disk of a folder.
     FreeSpace(PathBuf),
 }

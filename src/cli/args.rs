@@ -150,7 +150,7 @@ Examples:
     /// Run the whole paper, at a chosen scale.
     #[command(after_help = reproduce::EXAMPLES)]
     Reproduce(ReproduceArgs),
-    /// Watch a robot: an animated GIF and a page for the browser.
+    /// Watch a robot: an animated GIF and a page for the browser, or a film.
     #[command(after_help = "\
 Examples:
   morphcog replay --robot best
@@ -162,9 +162,13 @@ Examples:
   morphcog replay --robot best --format terminal
   # the best on validation images
   morphcog replay --robot best-validation:1
-  morphcog replay --robot best -o walk.gif")]
+  morphcog replay --robot best -o walk.gif
+  # a film for a talk, by ffmpeg
+  morphcog replay --robot best -o walk.mp4
+  # its single pictures, and the line that makes a film
+  morphcog replay --robot best -o frames/")]
     Replay(ReplayArgs),
-    /// Make a figure: SVG and PNG for papers and pages.
+    /// Make a figure: SVG, PNG and PDF for papers and pages.
     #[command(after_help = plot::EXAMPLES)]
     Plot(PlotArgs),
     /// Simulate any body with any stimuli.
@@ -379,26 +383,27 @@ pub(super) struct ReplayArgs {
     #[arg(long, value_name = "DIR")]
     pub(super) data: Option<PathBuf>,
     /// Formats to make, separated by commas (default: gif,html).
-    #[arg(short, long, value_delimiter = ',', value_parser = offering(FORMATS, str::parse::<Format>))]
+    #[arg(short, long, value_delimiter = ',', value_parser = offering(Format::ALL.map(|(_, name)| name), str::parse::<Format>))]
     pub(super) format: Vec<Format>,
-    /// File; its ending (.gif, .html, .png) sets the format (default: replay-<robot> beside
-    /// run.json).
+    /// File; its ending (.gif, .html, .png, .mp4, .webm) sets the format; a folder, such as frames/,
+    /// takes a film's single pictures (default: replay-<robot> beside run.json).
     #[arg(short, long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
-    /// Show all images at once in GIF and PNG, instead of one after another (the page has a button).
+    /// Show all images at once, instead of one after another (the page has a button).
     #[arg(long)]
     pub(super) side_by_side: bool,
-    /// Width of GIF and PNG in pixels; with --side-by-side, of each walk.
-    #[arg(long, default_value_t = 480, value_parser = whole::<u32>(0..=MOST))]
-    pub(super) width: u32,
-    /// Control steps per frame of the GIF: 1 is the robot's own time, more is faster and a smaller
-    /// file.
-    #[arg(long, default_value_t = 1, value_parser = whole::<u16>(1..=500))]
-    pub(super) every: u16,
-    /// Frames of the GIF per second: 25 with --every 2 is the robot's own time in half the frames.
-    #[arg(long, default_value_t = 50, value_parser = whole::<u32>(1..=50))]
-    pub(super) fps: u32,
-    /// Style of GIF and PNG: plain, or as in the paper's videos.
+    /// Width of pictures in pixels; with --side-by-side, of each walk (default: 480, films 1280).
+    #[arg(long, value_parser = whole::<u32>(0..=MOST))]
+    pub(super) width: Option<u32>,
+    /// Control steps per frame: more is faster and a smaller file (default: 1, or 2 of a GIF without
+    /// --fps).
+    #[arg(long, value_parser = whole::<u16>(1..=500))]
+    pub(super) every: Option<u16>,
+    /// Frames per second; 50 control steps are a second of the robot's own time (default: 50, or 25
+    /// of a GIF without --every).
+    #[arg(long, value_parser = whole::<u32>(1..=50))]
+    pub(super) fps: Option<u32>,
+    /// Style of pictures: plain, or as in the paper's videos.
     #[arg(long, default_value_t = Look::Plain, value_parser = offering(["plain", "paper"], str::parse::<Look>))]
     pub(super) look: Look,
     /// Open the result.
@@ -482,8 +487,6 @@ pub(super) struct DatasetArgs {
     #[arg(long, value_name = "BOOL")]
     pub(super) transpose: Option<bool>,
 }
-
-const FORMATS: [&str; 4] = ["gif", "html", "png", "terminal"];
 
 fn config_or_file() -> impl TypedValueParser<Value = String> {
     let names = config::BUILT_IN.map(|(name, _)| name);

@@ -83,8 +83,7 @@ pub(super) fn run(args: CapacityArgs, console: &Console) -> Result<(), Error> {
         return Err(error);
     }
     if !file.tasks.is_empty() {
-        let [svg, png] = networks::figure(&file, &options.out)?;
-        for path in [&svg, &png] {
+        for path in &networks::figure(&file, &options.out)? {
             console.line_about(path, &format!("wrote {}", path.display()));
         }
     }

@@ -92,6 +92,10 @@ fn words(remedy: &Remedy) -> String {
             "name another with --port, or leave it out to take a free one".to_string()
         }
         Remedy::NameRobot(id) => format!("name one, as in --robot {id}"),
+        Remedy::WriteFrames => {
+            "write its pictures with --format frames, which says the line that makes a film"
+                .to_string()
+        }
         Remedy::FreeSpace(folder) => {
             format!("make space on the disk that {} is on", folder.display())
         }

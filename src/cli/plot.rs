@@ -12,11 +12,12 @@ use crate::cli::values::{MOST, offering, seed, whole};
 use crate::commands::plot;
 use crate::commands::plot::{FigureKind, PlotOptions};
 use crate::commands::replay::{ReplayOptions, ShownImage};
-use crate::draw::plot::Background;
+use crate::draw::plot::{Background, MILLIMETRES, Style};
 use crate::robots::selection::{BEST, Selection};
 use crate::search::one_by_one;
 use crate::search::one_by_one::Named;
 use clap::Args;
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 pub(super) const EXAMPLES: &str = "\
@@ -44,7 +45,10 @@ Examples:
   morphcog plot spacetime --images train:1,test:17 \\
     -o walk.png --dpi 600
   morphcog plot body --robot top:3
-  morphcog plot progress --archive runs/zero_one-seed*";
+  morphcog plot progress --archive runs/zero_one-seed*
+  # for a paper set in Latin Modern
+  morphcog plot accuracy -o accuracy.pdf --no-title \\
+    --width 85 --font lmroman10-regular.otf";
 
 #[derive(Debug, Args)]
 pub(super) struct PlotArgs {
@@ -73,8 +77,8 @@ pub(super) struct PlotArgs {
     /// Control steps between the poses of snapshots (default: fits the walk).
     #[arg(long, value_parser = whole::<u32>(1..=MOST))]
     every: Option<u32>,
-    /// File; its ending (.svg, .png) sets the format (default: both, plot-<kind>[-<robot>] beside
-    /// run.json).
+    /// File; its ending (.svg, .png, .pdf) sets the format (default: all three,
+    /// plot-<kind>[-<robot>] beside run.json).
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// PNG resolution in pixels per inch (default: 300, or less for a side over 16000 pixels).
@@ -83,6 +87,20 @@ pub(super) struct PlotArgs {
     /// Transparent background.
     #[arg(long)]
     transparent: bool,
+    /// Leave out the title, for a figure with a caption.
+    #[arg(long)]
+    no_title: bool,
+    /// Width in millimetres; letters keep their size (default: 85 or 178, a journal's column or
+    /// page).
+    #[arg(long, value_name = "MM", value_parser = whole::<u32>(width()))]
+    width: Option<u32>,
+    /// Font of the letters (.ttf, .otf); a second --font is for bold ones.
+    #[arg(long, value_name = "FILE")]
+    font: Vec<PathBuf>,
+}
+
+fn width() -> RangeInclusive<u64> {
+    u64::from(*MILLIMETRES.start())..=u64::from(*MILLIMETRES.end())
 }
 
 pub(super) fn run(args: PlotArgs, console: &Console) -> Result<(), Error> {
@@ -96,7 +114,13 @@ pub(super) fn run(args: PlotArgs, console: &Console) -> Result<(), Error> {
     } = args;
     let archives = args.archives.paths();
     // What is wrong with the file is to be known before robots are searched for.
-    plot::endings(args.out.as_deref())?;
+    plot::formats(args.out.as_deref())?;
+    let style = Style::default().millimetres(args.width);
+    let style = match args.no_title {
+        true => style.without_title(),
+        false => style,
+    };
+    let style = style.in_font(&args.font)?;
     let robots: Vec<Named> = match selected(args.robot)? {
         Some(_) if !kind.is_of_robot() => return Err(plot::no_robot(kind)),
         None if !kind.is_of_robot() => {
@@ -134,6 +158,7 @@ pub(super) fn run(args: PlotArgs, console: &Console) -> Result<(), Error> {
         } else {
             Background::Paper
         },
+        style,
     };
     let made = plot::plot(&wanted, &Session::new(&NEVER, &Reporter::new(console)))?;
     sweeps::differences(console, &made.progress);

@@ -18,7 +18,7 @@ use crate::store::capacity::{CapacityFile, Curve, FORMAT, FORMAT_VERSION, Point,
 use crate::store::eval::{EvalFile, RobotReport};
 use crate::store::folder::check_out;
 use crate::store::images::HeldOut;
-use crate::store::names::{CAPACITY_JSON, RUN_JSON};
+use crate::store::names::{CAPACITY_JSON, FigureFormat, RUN_JSON};
 use crate::store::results::{replaced, write_with_table};
 use crate::store::run::RunFile;
 use crate::store::setting::{RunRef, RunSetting};
@@ -30,9 +30,6 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-
-/// File endings of the figure beside the results.
-pub(crate) const FIGURES: [&str; 2] = ["svg", "png"];
 
 /// Options of the comparison with networks.
 #[derive(Clone, Debug)]
@@ -65,10 +62,7 @@ pub fn capacity(options: &CapacityOptions, session: &Session) -> Result<Capacity
     let config = &options.config;
     kernel_fits(config, setting)?;
     check_out(&options.out, &options.eval, CAPACITY_JSON)?;
-    if FIGURES
-        .iter()
-        .any(|ending| options.out.with_extension(ending) == options.out)
-    {
+    if FigureFormat::beside(&options.out).contains(&options.out) {
         let text = "expected another ending: the figure beside the results has that name";
         return Err(Error::argument("out", options.out.display(), text));
     }
@@ -404,7 +398,7 @@ fn curve_of(kind: NetworkKind, trained: &[(usize, &[(f64, usize)])], robots: &[V
 }
 
 fn write(options: &CapacityOptions, file: &CapacityFile) -> Result<(), Error> {
-    let figures = FIGURES.map(|ending| options.out.with_extension(ending));
+    let figures = FigureFormat::beside(&options.out);
     write_with_table(&options.out, &file.to_json(), &file.to_csv(), figures)
 }
 

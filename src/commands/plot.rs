@@ -1,4 +1,4 @@
-//! `morphcog plot`: writes figures as SVG and PNG.
+//! `morphcog plot`: writes figures as SVG, PNG and PDF.
 
 use crate::analysis;
 use crate::analysis::gates::GateWalks;
@@ -10,7 +10,7 @@ use crate::commands::replay;
 use crate::commands::replay::{FoundRobot, ReplayOptions};
 use crate::draw::error::write_whole;
 use crate::draw::plot;
-use crate::draw::plot::{Background, Figure, PRINT};
+use crate::draw::plot::{Background, Figure, PRINT, Style};
 use crate::robots::published;
 use crate::search::one_by_one::Named;
 use crate::shipped::exists;
@@ -18,7 +18,7 @@ use crate::store::capacity::CapacityFile;
 use crate::store::eval::EvalFile;
 use crate::store::folder;
 use crate::store::names::METRICS;
-use crate::store::names::{CAPACITY_JSON, EVAL_JSON, RUN_JSON};
+use crate::store::names::{CAPACITY_JSON, EVAL_JSON, FigureFormat, RUN_JSON};
 use crate::store::run::{RunFile, different};
 use crate::store::stored_run::StoredRun;
 use std::fmt;
@@ -99,12 +99,14 @@ pub struct PlotOptions {
     pub options: ReplayOptions,
     /// The control steps between poses; 0 chooses them from the walk.
     pub every: usize,
-    /// The file; `None` writes SVG and PNG beside the run.json.
+    /// The file; `None` writes one of each format beside the run.json.
     pub out: Option<PathBuf>,
     /// The pixels of PNG per inch; `None` is as for print, or as many as possible.
     pub dpi: Option<u32>,
     /// The background.
     pub background: Background,
+    /// The width, title and font.
+    pub style: Style,
 }
 
 /// The result of `plot`, besides files.
@@ -125,7 +127,7 @@ struct Made {
 /// # Errors
 /// Returns an error if an input is invalid, or a figure cannot be made or written.
 pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Error> {
-    let endings = endings(wanted.out.as_deref())?;
+    let formats = formats(wanted.out.as_deref())?;
     let archives = match wanted.archives.as_slice() {
         [] if !wanted.kind.is_of_robot() => vec![folder::newest_run()?],
         archives => archives.to_vec(),
@@ -140,31 +142,32 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
             Error::usage(format!("expected with one figure only, these are {count}")).about("out"),
         );
     }
-    let named = |path: &Path, ending: &str| match path.extension() {
+    let named = |path: &Path, format: FigureFormat| match path.extension() {
         Some(_) => path.to_path_buf(),
-        None => with_ending(path, ending),
+        None => with_ending(path, format),
     };
     if let Some(path) = &wanted.out {
-        endings
+        formats
             .iter()
-            .try_for_each(|ending| folder::writable(&named(path, ending)))?;
+            .try_for_each(|format| folder::writable(&named(path, *format)))?;
     }
     let (mut progress, mut gates) = (Vec::new(), Vec::new());
     let write = |made: Made| -> Result<(), Error> {
         let figure = made.figure.on(wanted.background);
-        let made = |ending: &&str| -> Result<(PathBuf, Vec<u8>), Error> {
+        has_letters(&figure, &wanted.style)?;
+        let made = |format: &FigureFormat| -> Result<(PathBuf, Vec<u8>), Error> {
             let path = match &wanted.out {
-                Some(path) => named(path, ending),
-                None => with_ending(&made.stem, ending),
+                Some(path) => named(path, *format),
+                None => with_ending(&made.stem, *format),
             };
-            let bytes = match *ending {
-                "svg" => figure.svg().into_bytes(),
-                _ => png(session, &path, &figure, wanted.dpi)?,
+            let bytes = match format {
+                FigureFormat::Png => png(session, &path, &figure, wanted.dpi)?,
+                format => figure.bytes(*format)?,
             };
             Ok((path, bytes))
         };
         // Makes all files before writing any.
-        for (path, bytes) in endings.iter().map(made).collect::<Result<Vec<_>, _>>()? {
+        for (path, bytes) in formats.iter().map(made).collect::<Result<Vec<_>, _>>()? {
             write_whole(&path, &bytes)?;
             session.observer.wrote(&path, "");
         }
@@ -192,7 +195,7 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
                 .iter()
                 .for_each(|error| session.observer.warning(&format!("{error}; left out"))),
         }
-        let figure = plot::progress(&lines);
+        let figure = plot::progress(&lines, &wanted.style);
         let stem = folder::beside_all(&archives, &format!("plot-{}", wanted.kind));
         write(Made { figure, stem })?;
         progress = lines;
@@ -200,7 +203,7 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
         for path in &archives {
             let source = StoredRun::read(path)?;
             let found = analysis::gates::walks(&source, session)?;
-            let figure = plot::gates(&found, &source.run.name);
+            let figure = plot::gates(&found, &source.run.name, &wanted.style);
             let stem = stem(path, wanted.kind, "");
             write(Made { figure, stem })?;
             gates.extend(found);
@@ -220,12 +223,12 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
         let made = |path: &PathBuf| -> Result<Made, Error> {
             let stem = stem(path, wanted.kind, &result_name(wanted.kind, path));
             Ok(Made {
-                figure: of_run(wanted.kind, path)?,
+                figure: of_run(wanted, path)?,
                 stem,
             })
         };
         let all = archives.iter().map(made).collect::<Result<Vec<_>, _>>()?;
-        if let Some(dpi) = wanted.dpi.filter(|_| endings.contains(&"png")) {
+        if let Some(dpi) = wanted.dpi.filter(|_| formats.contains(&FigureFormat::Png)) {
             all.iter()
                 .try_for_each(|made| possible(&made.figure, dpi))?;
         }
@@ -255,13 +258,30 @@ fn png(
     Ok(figure.print()?)
 }
 
+/// Checks that the user's font has all letters of a figure.
+fn has_letters(figure: &Figure, style: &Style) -> Result<(), Error> {
+    let lacking = figure.lacking();
+    if style.is_embedded() || lacking.is_empty() {
+        return Ok(());
+    }
+    let letters: Vec<String> = lacking.iter().take(8).map(char::to_string).collect();
+    let more = if lacking.len() > 8 { " and others" } else { "" };
+    let text = format!(
+        "{}: the font lacks letters of the figure: {}{more}",
+        figure.title(),
+        letters.join(" ")
+    );
+    let error = Error::input(text).about("font");
+    Err(error.advice("choose a font that has them, or none for the program's own"))
+}
+
 /// Checks that a figure can have so many pixels per inch.
 fn possible(figure: &Figure, dpi: u32) -> Result<(), Error> {
     let most = figure.fitting(dpi);
     match most < dpi {
         true => {
             let text = format!(
-                "{}: expected at most {most}, or an .svg file",
+                "{}: expected at most {most}, or an .svg or .pdf file",
                 figure.title()
             );
             Err(Error::argument("dpi", dpi, text))
@@ -271,30 +291,29 @@ fn possible(figure: &Figure, dpi: u32) -> Result<(), Error> {
 }
 
 /// Returns the formats that a file name implies.
-pub(crate) fn endings(out: Option<&Path>) -> Result<Vec<&'static str>, Error> {
+pub(crate) fn formats(out: Option<&Path>) -> Result<Vec<FigureFormat>, Error> {
+    let all = FigureFormat::ALL.to_vec();
     let Some(path) = out else {
-        return Ok(vec!["svg", "png"]);
+        return Ok(all);
     };
     folder::check_is_file_path(path)?;
-    match path
-        .extension()
-        .map(|ending| ending.to_string_lossy().to_lowercase())
-        .as_deref()
-    {
-        None => Ok(vec!["svg", "png"]),
-        Some("svg") => Ok(vec!["svg"]),
-        Some("png") => Ok(vec!["png"]),
-        Some(_) => {
-            let text = "expected a file name that ends in .svg or .png";
+    let Some(ending) = path.extension() else {
+        return Ok(all);
+    };
+    let is_meant = |format: &FigureFormat| ending.eq_ignore_ascii_case(format.ending());
+    match all.into_iter().find(is_meant) {
+        Some(format) => Ok(vec![format]),
+        None => {
+            let text = "expected a file name that ends in .svg, .png or .pdf";
             Err(Error::argument("out", path.display(), text))
         }
     }
 }
 
-fn with_ending(stem: &Path, ending: &str) -> PathBuf {
+fn with_ending(stem: &Path, format: FigureFormat) -> PathBuf {
     let mut name = stem.as_os_str().to_owned();
     name.push(".");
-    name.push(ending);
+    name.push(format.ending());
     PathBuf::from(name)
 }
 
@@ -352,19 +371,23 @@ fn of_robot(wanted: &PlotOptions, named: &Named) -> Result<Made, Error> {
     };
     if wanted.kind == FigureKind::Body {
         let found = replay::find(&options)?;
-        return Ok(made(&found, plot::body(&found.body, &found.title())));
+        return Ok(made(
+            &found,
+            plot::body(&found.body, &found.title(), &wanted.style),
+        ));
     }
     let subject = replay::subject(&options)?;
     let title = subject.found.title();
     let recording = replay::record_subject(&subject);
     let figure = match wanted.kind {
-        FigureKind::Snapshots => plot::snapshots(&recording, wanted.every, &title),
-        _ => plot::spacetime(&recording, &title),
+        FigureKind::Snapshots => plot::snapshots(&recording, wanted.every, &title, &wanted.style),
+        _ => plot::spacetime(&recording, &title, &wanted.style),
     }?;
     Ok(made(&subject.found, figure))
 }
 
-fn of_run(kind: FigureKind, path: &Path) -> Result<Figure, Error> {
+fn of_run(wanted: &PlotOptions, path: &Path) -> Result<Figure, Error> {
+    let (kind, style) = (wanted.kind, &wanted.style);
     let maker = if kind == FigureKind::Accuracy {
         "eval"
     } else {
@@ -389,7 +412,7 @@ fn of_run(kind: FigureKind, path: &Path) -> Result<Figure, Error> {
                 );
                 return Err(with_maker(Error::input(text)));
             }
-            Ok(plot::accuracy(&report))
+            Ok(plot::accuracy(&report, style))
         }
         FigureKind::Capacity => {
             let (beside, eval) = (result(path, CAPACITY_JSON), folder::beside(path, EVAL_JSON));
@@ -410,9 +433,9 @@ fn of_run(kind: FigureKind, path: &Path) -> Result<Figure, Error> {
                     return Err(Error::input(text).remedy(remedy));
                 }
             }
-            Ok(plot::capacity(&file))
+            Ok(plot::capacity(&file, style))
         }
-        _ => RunFile::read(path).map(|run| plot::archive(&run)),
+        _ => RunFile::read(path).map(|run| plot::archive(&run, style)),
     }
 }
 
@@ -451,17 +474,19 @@ mod tests {
                 .unwrap_err()
                 .contains("spacetime")
         );
-        assert_eq!(endings(Some(Path::new("a.SVG"))).unwrap(), ["svg"]);
-        assert_eq!(endings(Some(Path::new("a"))).unwrap(), ["svg", "png"]);
+        let one = |path: &str| formats(Some(Path::new(path))).unwrap();
+        assert_eq!(one("a.SVG"), [FigureFormat::Svg]);
+        assert_eq!(one("a.pdf"), [FigureFormat::Pdf]);
+        assert_eq!(one("a"), FigureFormat::ALL);
         assert_eq!(
-            endings(Some(Path::new("a.pdf")))
+            formats(Some(Path::new("a.eps")))
                 .unwrap_err()
                 .kind
                 .exit_code(),
             2
         );
         assert_eq!(
-            with_ending(Path::new("x/plot-a.b"), "svg"),
+            with_ending(Path::new("x/plot-a.b"), FigureFormat::Svg),
             Path::new("x/plot-a.b.svg")
         );
     }

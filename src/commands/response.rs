@@ -19,10 +19,10 @@ use crate::robots;
 use crate::robots::selection::Selection;
 use crate::store::folder::{check_out, writable};
 use crate::store::images::DatasetRef;
-use crate::store::names::RESPONSE_JSON;
+use crate::store::names::{FigureFormat, RESPONSE_JSON};
 use crate::store::response::{
-    EndedBy, FORMAT, FORMAT_VERSION, PICTURES, ResponseFile, ResponseSetting, RobotResponse,
-    Unfinished, pictures,
+    EndedBy, FORMAT, FORMAT_VERSION, ResponseFile, ResponseSetting, RobotResponse, Unfinished,
+    pictures,
 };
 use crate::store::results::replaced;
 use crate::store::unwritten::Unwritten;
@@ -61,7 +61,7 @@ pub(crate) struct ResponseOptions {
 pub(crate) struct ResponseOutcome {
     pub(crate) file: ResponseFile,
     /// Pictures of its robots, still to be drawn.
-    pub(crate) pictures: Vec<[PathBuf; 2]>,
+    pub(crate) pictures: Vec<[PathBuf; 3]>,
     pub(crate) stopped: bool,
     pub(crate) unwritten: Option<Error>,
 }
@@ -203,7 +203,7 @@ pub(crate) fn measure(
                 .map(|before| before.map_or_else(|| file.clone(), |b| file.with_others_of(&b)));
             let is_new = |id: &str| file.robots.iter().any(|robot| robot.id == id);
             let outdated = asked.iter().zip(&drawn).filter(|(id, _)| is_new(id));
-            let outdated: Vec<[PathBuf; 2]> = outdated.map(|(_, files)| files.clone()).collect();
+            let outdated: Vec<[PathBuf; 3]> = outdated.map(|(_, files)| files.clone()).collect();
             let written = whole.and_then(|whole| whole.write(&options.out, &outdated));
             unwritten.tried(written, session)?;
         }
@@ -269,10 +269,7 @@ fn check_numbers(options: &ResponseOptions) -> Result<(), Error> {
 fn check_names(options: &ResponseOptions, subjects: &[Subject]) -> Result<(), Error> {
     let out = &options.out;
     check_out(out, &options.archive, RESPONSE_JSON)?;
-    if PICTURES
-        .iter()
-        .any(|ending| out.with_extension(ending) == *out)
-    {
+    if FigureFormat::beside(out).contains(out) {
         let text = "expected another ending: the picture beside the results has that name";
         return Err(Error::argument("out", out.display(), text));
     }

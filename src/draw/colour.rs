@@ -34,6 +34,15 @@ impl Colour {
     }
 
     /// Returns the gray of an intensity in [0, 1].
+    /// Mixes a share of this colour, 0 to 1, with another one.
+    pub(crate) fn mixed(self, other: Colour, share: f64) -> Self {
+        let mix = |k: usize| {
+            let (own, other) = (f64::from(self.rgb[k]), f64::from(other.rgb[k]));
+            (other + share * (own - other)).round() as u8
+        };
+        Colour::new(mix(0), mix(1), mix(2))
+    }
+
     pub(crate) fn gray(intensity: f64) -> Self {
         let level = (255.0 * intensity.clamp(0.0, 1.0)).round() as u8;
         Colour::new(level, level, level)

@@ -1,6 +1,7 @@
 //! [`PictureError`]: the reasons why a picture cannot be made; and atomic writing of files.
 
 use crate::base::error::Error;
+use crate::base::remedy::Remedy;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
@@ -48,6 +49,25 @@ pub enum PictureError {
     /// The encoder refused.
     #[error("the picture could not be encoded: {0}")]
     Encode(String),
+    /// The encoder of films could not be started.
+    #[error("{program} cannot be started: {source}")]
+    NoEncoder {
+        /// Its name or path.
+        program: String,
+        /// The error from the operating system.
+        source: std::io::Error,
+    },
+    /// The encoder of films failed.
+    #[error("{program} failed: {how}")]
+    Encoder {
+        /// Its name or path.
+        program: String,
+        /// Its exit status, and the last line of what it said.
+        how: String,
+    },
+    /// The encoder of films took no more pictures, though it did not fail.
+    #[error("the encoder of films ended early: {0}")]
+    Pipe(std::io::Error),
     /// The system has no threads left.
     #[error(transparent)]
     Threads(#[from] Error),
@@ -72,6 +92,12 @@ impl From<PictureError> for Error {
                 }
             }
             PictureError::Threads(error) => error,
+            PictureError::NoEncoder { .. } => Error::other(error.to_string())
+                .advice("install ffmpeg, or name it by MORPHCOG_FFMPEG")
+                .remedy(Remedy::WriteFrames),
+            PictureError::Encoder { .. } | PictureError::Pipe(_) => {
+                Error::other(error.to_string()).remedy(Remedy::WriteFrames)
+            }
             error => Error::other(error.to_string()),
         }
     }

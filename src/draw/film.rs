@@ -7,10 +7,45 @@ use crate::draw::raster;
 use crate::draw::scene::Look;
 use crate::draw::stage::Stage;
 use crate::draw::walk::Walk;
+use rayon::prelude::*;
 use tiny_skia::{Pixmap, PixmapPaint, Transform};
 
 /// Line between pictures side by side, pixels.
 const GAP: u32 = 2;
+
+/// The number of pictures rendered at a time.
+const BATCH: usize = 32;
+
+/// Options of moving pictures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct FilmOptions {
+    /// Width in pixels ([`stage::WIDTHS`](crate::draw::stage::WIDTHS)) of the picture, or of each
+    /// side by side; the body gives the height.
+    pub(crate) width: u32,
+    /// Frames per second, at most 50 (GIFs count hundredths of a second; viewers slow faster ones).
+    pub(crate) fps: f64,
+    /// The control steps from one frame to the next, at least 1. A second of the robot's time has
+    /// 50 control steps, so 2 at 25 frames per second is real time.
+    pub(crate) every: usize,
+    pub(crate) look: Look,
+    /// The seconds for which the last frame of each phase stays.
+    pub(crate) hold: f64,
+    /// True if all rollouts are shown at once.
+    pub(crate) side_by_side: bool,
+}
+
+impl Default for FilmOptions {
+    fn default() -> Self {
+        FilmOptions {
+            width: 480,
+            fps: 25.0,
+            every: 2,
+            look: Look::Plain,
+            hold: 0.6,
+            side_by_side: false,
+        }
+    }
+}
 
 /// A picture of a film.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -70,6 +105,34 @@ impl<'a> Film<'a> {
             true => Err(PictureError::Large { width, height }),
             false => Ok(film),
         }
+    }
+
+    /// Creates a film with these options.
+    ///
+    /// # Errors
+    /// Returns the errors of [`Film::new`].
+    pub(crate) fn of(walk: &'a Walk<'a>, options: &FilmOptions) -> Result<Self, PictureError> {
+        Film::new(walk, options.width, options.look, options.side_by_side)
+    }
+
+    /// Calls `show` with what `make` makes of each moment's picture, in order. Pictures are made in
+    /// parallel, with few in memory.
+    pub(crate) fn each<T: Send>(
+        &self,
+        moments: &[Moment],
+        make: impl Fn(Pixmap) -> T + Sync,
+        mut show: impl FnMut(&Moment, &T) -> Result<(), PictureError>,
+    ) -> Result<(), PictureError> {
+        for batch in moments.chunks(BATCH) {
+            let made: Vec<_> = batch
+                .par_iter()
+                .map(|moment| self.picture(moment).map(&make))
+                .collect();
+            for (moment, made) in batch.iter().zip(made) {
+                show(moment, &made?)?;
+            }
+        }
+        Ok(())
     }
 
     /// Gives voxels hard edges.

@@ -2,8 +2,8 @@
 //!
 //! A [`Walk`](walk::Walk) is a validated [`Recording`](crate::task::recording::Recording); a [`Stage`](stage::Stage) decides
 //! which part of the world a picture shows. `scene` and `panel` turn one frame into drawing
-//! primitives, and `raster` paints them. The animated GIF and the self-contained HTML page build on
-//! these. Figures for print are vectors, in [`plot`]; `serve` has its own page, over HTTP.
+//! primitives, and `raster` paints them. The animated GIF, films and the self-contained HTML page
+//! build on these. Figures for print are vectors, in [`plot`]; `serve` has its own page, over HTTP.
 
 pub(crate) mod colour;
 pub(crate) mod error;
@@ -11,6 +11,7 @@ pub(crate) mod film;
 pub(crate) mod fonts;
 pub mod gif;
 pub mod html;
+mod lzw;
 pub(crate) mod palette;
 pub(crate) mod panel;
 pub mod plot;
@@ -19,6 +20,7 @@ pub(crate) mod report;
 pub(crate) mod scene;
 pub(crate) mod sheet;
 pub(crate) mod stage;
+pub(crate) mod video;
 pub mod walk;
 
 /// Simulates a body (text form) for tests, under `phases` images, alternately dark and bright, for

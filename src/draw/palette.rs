@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-/// The maximum number of colours in a palette; one index of 256 is reserved for "unchanged".
-const COLOURS: usize = 255;
+/// Most colours of any palette; one index of 256 is reserved for "unchanged".
+pub(crate) const MOST: usize = 255;
 /// Colours closer than this (Euclidean, 255 per channel) share an index.
 const NEAR: i32 = 18;
 
-/// Up to 255 colours, with the nearest one to any colour.
+/// A number of colours, with the nearest one to any colour.
 #[derive(Clone, Debug)]
 pub(crate) struct Palette {
     colours: Vec<[u8; 3]>,
@@ -17,8 +17,12 @@ pub(crate) struct Palette {
 
 impl Palette {
     /// Creates a palette from the `fixed` colours and then the most frequent colours of the samples
-    /// (RGBA bytes), except those near a colour already in it.
-    pub(crate) fn new<'a>(fixed: &[[u8; 3]], samples: impl IntoIterator<Item = &'a [u8]>) -> Self {
+    /// (RGBA bytes), except those near a colour already in it; at most `most` colours.
+    pub(crate) fn new<'a>(
+        fixed: &[[u8; 3]],
+        samples: impl IntoIterator<Item = &'a [u8]>,
+        most: usize,
+    ) -> Self {
         let mut counts: BTreeMap<[u8; 3], u32> = BTreeMap::new();
         for sample in samples {
             for pixel in sample.chunks_exact(4) {
@@ -34,7 +38,7 @@ impl Palette {
             .chain(frequent.into_iter().map(|(colour, _)| colour))
         {
             let is_new = colours.iter().all(|c| distance(*c, colour) >= NEAR * NEAR);
-            if is_new && colours.len() < COLOURS {
+            if is_new && colours.len() < most.min(MOST) {
                 colours.push(colour);
             }
         }
@@ -61,7 +65,8 @@ impl Palette {
     }
 }
 
-fn distance(a: [u8; 3], b: [u8; 3]) -> i32 {
+/// Returns the squared distance of two colours.
+pub(crate) fn distance(a: [u8; 3], b: [u8; 3]) -> i32 {
     a.iter()
         .zip(b)
         .map(|(a, b)| (i32::from(*a) - i32::from(b)).pow(2))
@@ -78,7 +83,7 @@ mod tests {
             .flat_map(|i| [(i % 250) as u8, (i / 50) as u8, 9, 255])
             .collect();
         let fixed = [[255, 255, 255], [200, 10, 30]];
-        let palette = Palette::new(&fixed, [samples.as_slice()]);
+        let palette = Palette::new(&fixed, [samples.as_slice()], MOST);
         assert!(palette.colours().len() <= 255);
         for colour in fixed {
             assert_eq!(
@@ -89,7 +94,7 @@ mod tests {
         let few: Vec<u8> = (0..40u8)
             .flat_map(|i| [6 * i, 255 - 6 * i, 90, 255])
             .collect();
-        let palette = Palette::new(&fixed, [few.as_slice()]);
+        let palette = Palette::new(&fixed, [few.as_slice()], MOST);
         for pixel in few.chunks(4) {
             let colour = [pixel[0], pixel[1], pixel[2]];
             let found = palette.colours()[usize::from(palette.index(colour))];

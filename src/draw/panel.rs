@@ -2,11 +2,12 @@
 
 use crate::base::number;
 use crate::body::{Body, Material};
+use crate::draw::colour;
 use crate::draw::colour::Colour;
+use crate::draw::fonts::EMBEDDED;
 use crate::draw::scene::{Primitive, ruler};
 use crate::draw::stage::Stage;
 use crate::draw::walk::Walk;
-use crate::draw::{colour, fonts};
 use crate::task::answer;
 use crate::task::recording::{FramedImage, LabelledStimulus};
 
@@ -64,8 +65,8 @@ pub(crate) fn panel(walk: &Walk, frame: usize, stage: &Stage) -> Vec<Primitive> 
 /// names of image and robot do not count: they may have any length, and are cut.
 pub(crate) fn least_width(walk: &Walk) -> f64 {
     let recording = walk.recording();
-    let large = |text: &str| fonts::width(text, LARGE, true);
-    let small = |text: &str| fonts::width(text, SMALL, false);
+    let large = |text: &str| EMBEDDED.width(text, LARGE, true);
+    let small = |text: &str| EMBEDDED.width(text, SMALL, false);
     let farthest = (0..walk.frames())
         .map(|frame| walk.displacement(frame).abs())
         .fold(0.0, f64::max);
@@ -269,8 +270,8 @@ fn readouts(
     let words = readout(walk, frame);
     let recording = walk.recording();
     let mut line = |[dx, dy]: [f64; 2], text: &str, size: f64, bold, colour| {
-        let text = fonts::fitted(text, size, bold, room - dx);
-        let wide = fonts::width(&text, size, bold);
+        let text = EMBEDDED.fitted(text, size, bold, room - dx);
+        let wide = EMBEDDED.width(&text, size, bold);
         out.push(Primitive::Text {
             text,
             at: [x + dx * z, y + dy * z],
@@ -363,10 +364,10 @@ fn numbers(walk: &Walk, frame: usize, stage: &Stage, out: &mut Vec<Primitive>) {
         };
         // The sign hangs over, so that the digits are centred under their tick.
         let size = SMALL * z;
-        let digits = fonts::width(text.trim_start_matches(['+', '−']), size, false);
-        let left = at[0] - digits / 2.0 - (fonts::width(&text, size, false) - digits);
+        let digits = EMBEDDED.width(text.trim_start_matches(['+', '−']), size, false);
+        let left = at[0] - digits / 2.0 - (EMBEDDED.width(&text, size, false) - digits);
         // A number that would be cut off at the edge is left out.
-        let end = left + fonts::width(&text, size, false);
+        let end = left + EMBEDDED.width(&text, size, false);
         if left < 0.0 || end > f64::from(stage.width) {
             continue;
         }
@@ -438,7 +439,7 @@ mod tests {
                     } if at[1] < stage.panel => Some((
                         text.as_str(),
                         at[0],
-                        at[0] + fonts::width(text, *size, *bold),
+                        at[0] + EMBEDDED.width(text, *size, *bold),
                     )),
                     _ => None,
                 });

@@ -2,10 +2,11 @@
 
 use crate::draw::colour::Colour;
 use crate::draw::error::{PictureError, write_whole};
+use crate::draw::fonts::EMBEDDED;
 use crate::draw::scene::Primitive;
 use crate::draw::stage::Stage;
 use crate::draw::walk::Walk;
-use crate::draw::{fonts, panel, scene};
+use crate::draw::{panel, scene};
 use std::path::Path;
 use tiny_skia::{FillRule, LineCap, LineJoin, Paint, PathBuilder, Pixmap, Stroke, Transform};
 
@@ -64,7 +65,7 @@ pub(crate) fn draw(
                 bold,
                 colour,
             } => {
-                if let (Some(path), _) = fonts::letters(text, *size, *bold) {
+                if let (Some(path), _) = EMBEDDED.letters(text, *size, *bold) {
                     let [x, y] = place(at);
                     let (paint, there) = (paint(*colour, true), Transform::from_translate(x, y));
                     pixmap.fill_path(&path, &paint, FillRule::Winding, there, None);
@@ -123,10 +124,13 @@ pub(crate) fn paint(colour: Colour, smooth: bool) -> Paint<'static> {
 
 /// Writes a picture as PNG, atomically.
 pub(crate) fn write_png(path: &Path, picture: &Pixmap) -> Result<(), PictureError> {
-    let bytes = picture
+    write_whole(path, &png_bytes(picture)?)
+}
+
+pub(crate) fn png_bytes(picture: &Pixmap) -> Result<Vec<u8>, PictureError> {
+    picture
         .encode_png()
-        .map_err(|e| PictureError::Encode(e.to_string()))?;
-    write_whole(path, &bytes)
+        .map_err(|e| PictureError::Encode(e.to_string()))
 }
 
 #[cfg(test)]

@@ -65,6 +65,8 @@ pub(crate) enum Primitive {
 
 /// The pixels per voxel length from which materials are marked: smaller marks would be specks.
 const MARKED: f64 = 5.0;
+/// The share of a mark's colour in crisp pictures; the rest is that of its voxel.
+const CRISP_MARK: f64 = 0.7;
 /// The minimum width of a mark, pixels; it takes a larger share of small voxels.
 const MARK_PIXELS: f64 = 4.0;
 
@@ -229,7 +231,13 @@ fn body(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
     // The paper's pictures have no marks.
     if window.scale >= MARKED && window.look == Look::Plain {
         out.extend(voxels().flat_map(|(material, corners)| {
-            let colour = colour::mark_colour(material, colour::shade(material, area(&corners)));
+            let fill = colour::shade(material, area(&corners));
+            let mark = colour::mark_colour(material, fill);
+            // Hard edges would make a mark stronger than smooth ones do.
+            let colour = match smooth {
+                true => mark,
+                false => mark.mixed(fill, CRISP_MARK),
+            };
             let width = (colour::MARK_WIDTH * window.scale).max(1.0);
             let larger = (MARK_PIXELS / (colour::MARK_EXTENT * window.scale)).max(1.0);
             let line = move |points: &&[[f64; 2]]| Primitive::Line {
@@ -239,7 +247,7 @@ fn body(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
                     .collect(),
                 width,
                 colour,
-                smooth: true,
+                smooth,
             };
             colour::mark(material).iter().map(line)
         }));

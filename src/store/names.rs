@@ -1,5 +1,7 @@
 //! Names of the files in and beside a run's folder.
 
+use std::path::{Path, PathBuf};
+
 /// The verdicts of `audit`, beside `run.json`.
 pub const AUDIT_JSON: &str = "audit.json";
 pub(crate) const CAPACITY_JSON: &str = "capacity.json";
@@ -34,3 +36,30 @@ pub(crate) const METRICS: &str = "metrics.csv";
 pub(crate) const CHECKPOINTS: [&str; 2] = ["checkpoint.json", "checkpoint.previous.json"];
 pub(crate) const LOCK: &str = ".lock";
 pub(crate) const TASK_LOCK: &str = ".task.lock";
+
+/// The formats of a figure's files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum FigureFormat {
+    Svg,
+    Png,
+    Pdf,
+}
+
+impl FigureFormat {
+    pub(crate) const ALL: [FigureFormat; 3] =
+        [FigureFormat::Svg, FigureFormat::Png, FigureFormat::Pdf];
+
+    /// Returns the extension of such a file.
+    pub(crate) fn ending(self) -> &'static str {
+        match self {
+            FigureFormat::Svg => "svg",
+            FigureFormat::Png => "png",
+            FigureFormat::Pdf => "pdf",
+        }
+    }
+
+    /// Returns a path with the extension of each format in place of its own.
+    pub(crate) fn beside(path: &Path) -> [PathBuf; 3] {
+        FigureFormat::ALL.map(|format| path.with_extension(format.ending()))
+    }
+}

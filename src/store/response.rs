@@ -11,6 +11,7 @@ use crate::response::gait::Gait;
 use crate::response::regression::Response;
 use crate::shipped::exists;
 use crate::store::images::DatasetRef;
+use crate::store::names::FigureFormat;
 use crate::store::results::{self, Stored, by_lines, write_with_table};
 use crate::task::margins::Margins;
 use crate::task::perturbation::Condition;
@@ -21,9 +22,6 @@ use std::path::{Path, PathBuf};
 
 pub(crate) const FORMAT: &str = "morphcog-response";
 pub(crate) const FORMAT_VERSION: u32 = 1;
-
-/// The extensions of a robot's pictures beside the results.
-pub(crate) const PICTURES: [&str; 2] = ["svg", "png"];
 
 /// The content of `response.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -439,7 +437,7 @@ impl ResponseFile {
 
     /// Writes the file, and its CSV beside it. If the results have changed, it first removes the
     /// `outdated` pictures, to be redrawn.
-    pub(crate) fn write(&self, path: &Path, outdated: &[[PathBuf; 2]]) -> Result<(), Error> {
+    pub(crate) fn write(&self, path: &Path, outdated: &[[PathBuf; 3]]) -> Result<(), Error> {
         write_with_table(
             path,
             &self.to_json(),
@@ -449,15 +447,17 @@ impl ResponseFile {
     }
 }
 
-/// Returns the SVG and PNG paths of robots' pictures beside `out`; one robot alone has its stem.
-pub(crate) fn pictures(out: &Path, ids: &[&str]) -> Vec<[PathBuf; 2]> {
+/// Returns the paths of robots' pictures beside `out`, one for each format; one robot alone has its
+/// stem.
+pub(crate) fn pictures(out: &Path, ids: &[&str]) -> Vec<[PathBuf; 3]> {
     let stem = out
         .file_stem()
         .expect("its name was checked before anything was measured")
         .to_string_lossy();
     let named = |id: &&str| match ids.len() {
-        1 => PICTURES.map(|ending| out.with_extension(ending)),
-        _ => PICTURES.map(|ending| out.with_file_name(format!("{stem}-{id}.{ending}"))),
+        1 => FigureFormat::beside(out),
+        _ => FigureFormat::ALL
+            .map(|format| out.with_file_name(format!("{stem}-{id}.{}", format.ending()))),
     };
     ids.iter().map(named).collect()
 }

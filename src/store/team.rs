@@ -6,6 +6,7 @@ use crate::base::table;
 use crate::body::Body;
 use crate::data::description::check_names;
 use crate::store::images::{HeldOut, ImageRef};
+use crate::store::names::FigureFormat;
 use crate::store::results::{self, Stored, write_with_table};
 use crate::task::answer::Direction;
 use crate::task::answer::Readout;
@@ -22,10 +23,11 @@ pub(crate) const FORMAT_VERSION: u32 = 1;
 /// The names of the figures beside it: the confusion matrix, and the poster of all bodies.
 pub(crate) const FIGURES: [&str; 2] = ["confusion", "bodies"];
 
-/// Returns the files of a figure beside results in `out`, as SVG and as PNG.
-pub(crate) fn figure(out: &Path, name: &str) -> [PathBuf; 2] {
+/// Returns the files of a figure beside results in `out`, one for each format.
+pub(crate) fn figure(out: &Path, name: &str) -> [PathBuf; 3] {
     let stem = out.file_stem().unwrap_or_default().to_string_lossy();
-    ["svg", "png"].map(|ending| out.with_file_name(format!("{stem}-{name}.{ending}")))
+    let file = |format: FigureFormat| format!("{stem}-{name}.{}", format.ending());
+    FigureFormat::ALL.map(|format| out.with_file_name(file(format)))
 }
 
 /// The maximum number of cycles per image: the default of the longest rollout.

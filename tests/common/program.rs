@@ -15,9 +15,10 @@ pub const PROGRAM: &str = env!("CARGO_BIN_EXE_morphcog");
 /// Time limit of every command in a test.
 const LIMIT: Duration = Duration::from_secs(120);
 /// Variables of the environment that must not affect tests.
-pub const SETTINGS: [&str; 9] = [
+pub const SETTINGS: [&str; 10] = [
     "MORPHCOG_ATLAS",
     "MORPHCOG_DATA",
+    "MORPHCOG_FFMPEG",
     "MORPHCOG_ISA",
     "NO_COLOR",
     "TERM",

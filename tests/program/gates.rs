@@ -90,7 +90,7 @@ fn every_shipped_gate_is_physical_and_walks_the_right_way_under_all_four_inputs(
         assert_eq!(cells[7], "8 of 8", "{cells:?}");
         cells[2]
     });
-    for file in ["gates.svg", "gates.png"] {
+    for file in ["gates.svg", "gates.png", "gates.pdf"] {
         assert!(sandbox.path(file).exists());
     }
     sandbox

@@ -9,6 +9,7 @@ mod compare;
 mod configs;
 mod data;
 mod eval;
+mod film;
 mod full_disk;
 mod gaits;
 mod gates;

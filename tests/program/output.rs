@@ -39,6 +39,7 @@ fn no_table_shows_a_minus_nothing() {
     }
     for nothing in [
         "-0.00<", "-0.00 ", "−0.00", "-0.0<", "-0.0 ", "-0.0]", "−0.0<", "−0.0 ", "+0.0<", "+0.0 ",
+        "-0.0\"", "−0.0\"", "+0.0\"",
     ] {
         let at = said.find(nothing).map(|at| {
             said[at.saturating_sub(60)..]

@@ -22,7 +22,7 @@ use morphcog::commands::plot::{self, FigureKind, PlotOptions};
 use morphcog::commands::simulate::{Scenario, simulate};
 use morphcog::commands::{eval, replay};
 use morphcog::config::Config;
-use morphcog::draw::plot::{Background, confusion, poster};
+use morphcog::draw::plot::{Background, Style, confusion, poster};
 use morphcog::images::training::TrainingImages;
 use morphcog::robots::selection::Selection;
 use morphcog::serve::server::Server;
@@ -270,6 +270,7 @@ impl World {
             out: Some(self.sandbox.path("figure.svg")),
             dpi: Some(36),
             background: Background::Paper,
+            style: Style::default(),
         };
         case.check(plot::plot(&wanted, &Session::new(&NEVER, &reporter)), name);
         for page in [out, err] {
@@ -425,7 +426,10 @@ fn team(world: &World, dice: &mut Dice, case: &mut Case) {
     if let Some(file) = case.check(TeamFile::read(&folder.join("team.json")), "team.json") {
         let (is_decided, has_robots) = (file.answers.is_some(), !file.members.is_empty());
         assert_eq!(
-            (confusion(&file).is_some(), poster(&file).is_some()),
+            (
+                confusion(&file, &Style::default()).is_some(),
+                poster(&file, &Style::default()).is_some(),
+            ),
             (is_decided, has_robots)
         );
     }

@@ -528,6 +528,7 @@ fn a_response() {
             "response.csv",
             "response.svg",
             "response.png",
+            "response.pdf",
         ],
     );
 }

@@ -5,12 +5,13 @@ use crate::base::number;
 use crate::base::number::percent;
 use crate::baseline::curve::Crossing;
 use crate::cli::output::console::{Console, Mode};
-use crate::commands::capacity::FIGURES;
 use crate::commands::reproduce::ReproduceOutcome;
-use crate::draw::error::{PictureError, write_whole};
+use crate::draw::error::PictureError;
 use crate::draw::plot;
+use crate::draw::plot::Style;
 use crate::draw::report::tables::published_size;
 use crate::store::capacity::{CapacityFile, Curve, TaskCapacity, spoken};
+use crate::store::names::FigureFormat;
 use std::path::{Path, PathBuf};
 
 /// Writes the table: task, accuracy and capacity, with the paper's values beside ours. `out` is the
@@ -119,12 +120,10 @@ fn unknown() -> String {
     "–".to_string()
 }
 
-/// Writes the figure beside a `capacity.json`, as SVG and as PNG; returns the files.
-pub(crate) fn figure(file: &CapacityFile, out: &Path) -> Result<[PathBuf; 2], PictureError> {
-    let figure = plot::capacity(file);
-    let files = FIGURES.map(|ending| out.with_extension(ending));
-    write_whole(&files[0], figure.svg().as_bytes())?;
-    write_whole(&files[1], &figure.print()?)?;
+/// Writes the figure beside a `capacity.json`, one for each format; returns them.
+pub(crate) fn figure(file: &CapacityFile, out: &Path) -> Result<[PathBuf; 3], PictureError> {
+    let files = FigureFormat::beside(out);
+    plot::capacity(file, &Style::default()).write(&files)?;
     Ok(files)
 }
 

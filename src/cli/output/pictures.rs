@@ -2,14 +2,16 @@
 
 use crate::base::error::Error;
 use crate::base::number;
+use crate::base::remedy::Remedy;
 use crate::cli::output::console::Console;
 use crate::cli::output::player;
 use crate::commands::replay::Replay;
 use crate::draw::error::PictureError;
-use crate::draw::film::Film;
+use crate::draw::film::{Film, FilmOptions};
 use crate::draw::scene::Look;
+use crate::draw::video::Container;
 use crate::draw::walk::Walk;
-use crate::draw::{gif, html, raster};
+use crate::draw::{gif, html, raster, video};
 use crate::shipped;
 use crate::store::folder;
 use std::fmt;
@@ -22,14 +24,23 @@ pub(crate) enum Format {
     Html,
     /// The last frame as PNG.
     Png,
+    /// A film for talks and players.
+    Mp4,
+    /// A film for pages.
+    Webm,
+    /// A folder with each picture of a film as PNG.
+    Frames,
     Terminal,
 }
 
 impl Format {
-    const ALL: [(Format, &str); 4] = [
+    pub(crate) const ALL: [(Format, &str); 7] = [
         (Format::Gif, "gif"),
         (Format::Html, "html"),
         (Format::Png, "png"),
+        (Format::Mp4, "mp4"),
+        (Format::Webm, "webm"),
+        (Format::Frames, "frames"),
         (Format::Terminal, "terminal"),
     ];
 }
@@ -51,7 +62,7 @@ impl FromStr for Format {
             .find(|(_, name)| *name == text.to_lowercase());
         found
             .map(|(format, _)| *format)
-            .ok_or_else(|| "expected gif, html, png or terminal".to_string())
+            .ok_or_else(|| "expected gif, html, png, mp4, webm, frames or terminal".to_string())
     }
 }
 
@@ -65,47 +76,74 @@ fn or_default(asked: &[Format]) -> &[Format] {
 }
 
 /// The pictures to make, and their files.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct PicturesWanted {
     /// The formats with their files (unused for the terminal).
     pub(crate) files: Vec<(Format, PathBuf)>,
-    /// The width of GIF and PNG, pixels.
-    pub(crate) width: u32,
-    /// The control steps from one frame of the GIF to the next.
-    pub(crate) every: usize,
-    /// The frames of the GIF per second.
-    pub(crate) fps: u32,
-    /// The look of the world in GIF and PNG.
+    /// The width of pictures, pixels; by default 480, and 1280 of films.
+    pub(crate) width: Option<u32>,
+    /// The control steps from one frame to the next.
+    pub(crate) every: Option<usize>,
+    /// The frames per second.
+    pub(crate) fps: Option<u32>,
+    /// The look of the world.
     pub(crate) look: Look,
-    /// True if GIF and PNG show all images at once.
+    /// True if pictures show all images at once.
     pub(crate) side_by_side: bool,
 }
 
-impl Default for PicturesWanted {
-    fn default() -> Self {
-        PicturesWanted {
-            files: Vec::new(),
-            width: 480,
-            every: 1,
-            fps: 50,
-            look: Look::Plain,
-            side_by_side: false,
+impl PicturesWanted {
+    /// Returns how a format moves. A GIF has half of the frames unless the speed is chosen: it is
+    /// large, and its viewers are slow.
+    fn film(&self, format: Format) -> FilmOptions {
+        let (every, fps) = match (self.every, self.fps) {
+            (None, None) if format == Format::Gif => (2, 25),
+            (every, fps) => (every.unwrap_or(1), fps.unwrap_or(50)),
+        };
+        let width = match format {
+            Format::Mp4 | Format::Webm | Format::Frames => 1280,
+            _ => 480,
+        };
+        FilmOptions {
+            width: self.width.unwrap_or(width),
+            every,
+            fps: f64::from(fps),
+            look: self.look,
+            side_by_side: self.side_by_side,
+            ..FilmOptions::default()
         }
     }
-}
 
-impl PicturesWanted {
     /// Chooses `replay-<name>.<format>` in a folder.
     pub(crate) fn beside(folder: &Path, name: &str, formats: &[Format]) -> Self {
-        let file = |&format: &Format| (format, folder.join(format!("replay-{name}.{format}")));
+        let file = |&format: &Format| {
+            let ending = if format == Format::Frames { '-' } else { '.' };
+            (
+                format,
+                folder.join(format!("replay-{name}{ending}{format}")),
+            )
+        };
         PicturesWanted {
             files: or_default(formats).iter().map(file).collect(),
             ..PicturesWanted::default()
         }
     }
 
-    /// Takes the format from a file's extension; without one, chooses a file for each of `formats`.
+    /// Takes the format from a file's extension; without one, chooses a file for each of `formats`. A
+    /// folder is for the single pictures.
     pub(crate) fn named(path: &Path, formats: &[Format]) -> Result<Self, Error> {
+        let is_folder = folder::check_is_file_path(path).is_err();
+        if formats == [Format::Frames] || (formats.is_empty() && is_folder) {
+            let has_any = |mut entries: std::fs::ReadDir| entries.next().is_some();
+            if std::fs::read_dir(path).is_ok_and(has_any) {
+                let text = format!("{}: expected a new folder, or an empty one", path.display());
+                return Err(Error::occupied(text).remedy(Remedy::ChooseOut));
+            }
+            return Ok(PicturesWanted {
+                files: vec![(Format::Frames, path.to_path_buf())],
+                ..PicturesWanted::default()
+            });
+        }
         folder::check_is_file_path(path)?;
         let files = match path
             .extension()
@@ -113,15 +151,18 @@ impl PicturesWanted {
         {
             None => or_default(formats)
                 .iter()
-                .map(|format| (*format, path.with_extension(format.to_string())))
+                .map(|format| match format {
+                    Format::Frames => (*format, with_suffix(path, "-frames")),
+                    format => (*format, path.with_extension(format.to_string())),
+                })
                 .collect(),
             Some(ending) => {
                 let format = Format::from_str(&ending)
                     .ok()
-                    .filter(|format| *format != Format::Terminal);
+                    .filter(|format| !matches!(format, Format::Terminal | Format::Frames));
                 let format = format.ok_or_else(|| {
                     Error::usage(format!(
-                        "{}: expected a file name that ends in .gif, .html or .png",
+                        "{}: expected a file name that ends in .gif, .html, .png, .mp4 or .webm",
                         path.display()
                     ))
                 })?;
@@ -137,7 +178,7 @@ impl PicturesWanted {
         };
         files
             .iter()
-            .filter(|(format, _)| *format != Format::Terminal)
+            .filter(|(format, _)| !matches!(format, Format::Terminal | Format::Frames))
             .try_for_each(|(_, path)| folder::writable(path))?;
         Ok(PicturesWanted {
             files,
@@ -155,11 +196,11 @@ impl PicturesWanted {
 
 /// Checks that one of some formats (none: the default ones) can show rollouts side by side.
 pub(crate) fn check_side_by_side(formats: &[Format]) -> Result<(), Error> {
-    let can = |format: &Format| matches!(format, Format::Gif | Format::Png);
+    let can = |format: &Format| !matches!(format, Format::Html | Format::Terminal);
     match or_default(formats).iter().any(can) {
         true => Ok(()),
         false => {
-            let text = "it is for GIF and PNG; the page has a button for it";
+            let text = "it is for pictures and films; the page has a button for it";
             Err(Error::usage(text.to_string()).about("side_by_side"))
         }
     }
@@ -200,6 +241,14 @@ pub(crate) fn make(
     }
     made.iter()
         .for_each(|path| console.line_about(path, &format!("wrote {}", path.display())));
+    for (_, folder) in wanted
+        .files
+        .iter()
+        .filter(|(format, _)| *format == Format::Frames)
+    {
+        let line = video::command(folder, wanted.film(Format::Frames).fps);
+        console.info(&format!("to make a film of them: {line}"));
+    }
     Ok(made)
 }
 
@@ -220,23 +269,22 @@ pub(crate) fn write(
     let recording = &replay.recording;
     let title = format!("morphcog: robot {}", recording.robot);
     for (format, path) in &wanted.files {
+        let options = wanted.film(*format);
         match format {
-            Format::Gif => {
-                let options = gif::GifOptions {
-                    width: wanted.width,
-                    every: wanted.every,
-                    fps: f64::from(wanted.fps),
-                    look: wanted.look,
-                    side_by_side: wanted.side_by_side,
-                    ..gif::GifOptions::default()
-                };
-                gif::write(path, recording, &options).map_err(failed)?;
+            Format::Gif => gif::write(path, recording, &options).map_err(failed)?,
+            Format::Mp4 => {
+                video::write(path, Container::Mp4, recording, &options).map_err(failed)?;
+            }
+            Format::Webm => {
+                video::write(path, Container::Webm, recording, &options).map_err(failed)?;
+            }
+            Format::Frames => {
+                video::write_frames(path, recording, &options).map_err(failed)?;
             }
             Format::Html => html::write(path, recording, &title, &replay.about).map_err(failed)?,
             Format::Png => {
                 let walk = Walk::new(recording).map_err(failed)?;
-                let film = Film::new(&walk, wanted.width, wanted.look, wanted.side_by_side);
-                let film = film.map_err(failed)?;
+                let film = Film::of(&walk, &options).map_err(failed)?;
                 let moments = film.moments(usize::MAX);
                 let last = moments.last().expect("a walk has a frame");
                 let picture = film.picture(last).map_err(failed)?;
@@ -250,4 +298,10 @@ pub(crate) fn write(
         made.push(path.clone());
     }
     Ok(made)
+}
+
+fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(suffix);
+    PathBuf::from(name)
 }

@@ -4,8 +4,9 @@ use crate::base::number;
 use crate::base::number::percent;
 use crate::cli::output::console::{Console, Mode};
 use crate::commands::response::ResponseOutcome;
-use crate::draw::error::{PictureError, write_whole};
+use crate::draw::error::PictureError;
 use crate::draw::plot;
+use crate::draw::plot::Style;
 use crate::robots::published;
 use crate::store::response::{EndedBy, RobotResponse};
 use std::path::Path;
@@ -123,16 +124,15 @@ fn row(robot: &RobotResponse, is_taught: bool, has_window: bool) -> Vec<String> 
 /// Writes the pictures of the robots.
 pub(crate) fn pictures(console: &Console, finished: &ResponseOutcome) -> Result<(), PictureError> {
     let ResponseOutcome { file, pictures, .. } = finished;
-    for (robot, [svg, png]) in file.robots.iter().zip(pictures) {
+    for (robot, paths) in file.robots.iter().zip(pictures) {
         let of = format!(
             "robot {}, {}",
             robot.id,
             published::provenance(&file.run, file.run_seed)
         );
-        let figure = plot::response(robot, file.setting.task.as_deref(), &of);
-        write_whole(svg, figure.svg().as_bytes())?;
-        write_whole(png, &figure.print()?)?;
-        for path in [&svg, &png] {
+        let task = file.setting.task.as_deref();
+        plot::response(robot, task, &of, &Style::default()).write(paths)?;
+        for path in paths {
             console.line_about(path, &format!("wrote {}", path.display()));
         }
     }

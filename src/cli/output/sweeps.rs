@@ -10,9 +10,9 @@ use crate::base::text::counted;
 use crate::base::text::duration;
 use crate::cli::output::console::{Console, Mode};
 use crate::commands::tasks::TaskStatus;
-use crate::draw::error::write_whole;
 use crate::draw::plot;
-use crate::draw::plot::Figure;
+use crate::draw::plot::{Figure, Style};
+use crate::store::names::FigureFormat;
 use crate::store::task::TaskState;
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -91,18 +91,21 @@ pub(crate) fn collected(
     console.line("");
     console.line_about(&path, &format!("wrote {}", path.display()));
     let draw = |stem: &str, figure: Figure| -> Result<(), Error> {
-        for (ending, bytes) in [("svg", figure.svg().into_bytes()), ("png", figure.print()?)] {
-            let path = out.join(format!("{stem}.{ending}"));
-            write_whole(&path, &bytes)?;
+        let paths = FigureFormat::ALL.map(|format| out.join(format!("{stem}.{}", format.ending())));
+        figure.write(&paths)?;
+        for path in paths {
             console.line_about(&path, &format!("wrote {}", path.display()));
         }
         Ok(())
     };
-    if let Some(figure) = plot::sweep(name, &found.rows) {
+    if let Some(figure) = plot::sweep(name, &found.rows, &Style::default()) {
         draw("sweep-accuracy", figure)?;
     }
     if !found.progress.is_empty() {
-        draw("sweep-progress", plot::progress(&found.progress))?;
+        draw(
+            "sweep-progress",
+            plot::progress(&found.progress, &Style::default()),
+        )?;
         differences(console, &found.progress);
     }
     let open = status

@@ -3,8 +3,8 @@
 use crate::base::error::Error;
 use crate::base::number::percent;
 use crate::cli::output::console::{Console, Mode};
-use crate::draw::error::write_whole;
 use crate::draw::plot;
+use crate::draw::plot::Style;
 use crate::draw::report::decisions::{figures, remarks, table};
 use crate::store::team::{Decoded, FIGURES, Member, TeamFile, figure};
 use std::path::Path;
@@ -90,17 +90,15 @@ fn answers(console: &Console, file: &TeamFile) {
 
 /// Writes the confusion matrix and the poster of all bodies; returns their paths.
 fn pictures(file: &TeamFile, out: &Path) -> Result<Vec<String>, Error> {
-    let mut written = Vec::new();
+    let (mut written, style) = (Vec::new(), Style::default());
     for (name, drawn) in FIGURES
         .into_iter()
-        .zip([plot::confusion(file), plot::poster(file)])
+        .zip([plot::confusion(file, &style), plot::poster(file, &style)])
     {
         let Some(drawn) = drawn else { continue };
-        for (path, bytes) in figure(out, name)
-            .into_iter()
-            .zip([drawn.svg().into_bytes(), drawn.print()?])
-        {
-            write_whole(&path, &bytes)?;
+        let paths = figure(out, name);
+        drawn.write(&paths)?;
+        for path in paths {
             written.push(path.display().to_string());
         }
     }

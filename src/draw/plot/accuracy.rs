@@ -4,8 +4,9 @@ use crate::base::number;
 use crate::draw::colour;
 use crate::draw::plot::axes::{AXIS, Axis, MARGIN, Plot, heading_in_lines};
 use crate::draw::plot::canvas::{Canvas, Pen, TEXT, TextStyle};
-use crate::draw::plot::figure::{COLUMN, Figure};
-use crate::draw::{fonts, plot::scales};
+use crate::draw::plot::figure::Figure;
+use crate::draw::plot::scales;
+use crate::draw::plot::style::Style;
 use crate::store::eval::{EvalFile, RobotReport};
 use std::collections::BTreeSet;
 
@@ -14,11 +15,11 @@ const NAMED: usize = 40;
 
 /// Plots the accuracy of every robot on test or validation images with its 95 % interval, a block
 /// per task, with the mean and the baselines, which need no body.
-pub(crate) fn accuracy(report: &EvalFile) -> Figure {
-    let mut canvas = Canvas::new();
+pub(crate) fn accuracy(report: &EvalFile, style: &Style) -> Figure {
+    let mut canvas = Canvas::new(style);
     let of = format!("{}; {}", runs(report), report.selection());
     let title = format!("Accuracy on {} images", report.split);
-    let top = heading_in_lines(&mut canvas, &title, &of, COLUMN, 3);
+    let top = heading_in_lines(&mut canvas, &title, &of, style.column(), 3);
     let named = report.robots.len() <= NAMED;
     let line = if named { 10.5 } else { 3.0 };
     let mut tasks: Vec<&str> = report
@@ -29,7 +30,8 @@ pub(crate) fn accuracy(report: &EvalFile) -> Figure {
     tasks.sort_unstable();
     tasks.dedup();
     let block_head = if tasks.len() > 1 { 12.0 } else { 0.0 };
-    let name_width = |robot: &RobotReport| fonts::width(&name(report, robot), TEXT, false);
+    let font = style.font();
+    let name_width = |robot: &RobotReport| font.width(&name(report, robot), TEXT, false);
     let names = report
         .robots
         .iter()
@@ -44,7 +46,7 @@ pub(crate) fn accuracy(report: &EvalFile) -> Figure {
         .fold(0.5, f64::min);
     let axis = Axis::nice((100.0 * lowest / 10.0).floor() * 10.0, 100.0, 5);
     let all = tasks.len() as f64 * (block_head + 6.0) + line * report.robots.len() as f64;
-    let size = [COLUMN - MARGIN - 8.0 - left, all];
+    let size = [style.column() - MARGIN - 8.0 - left, all];
     let plot = Plot {
         at: [left, top],
         size,
@@ -85,7 +87,7 @@ pub(crate) fn accuracy(report: &EvalFile) -> Figure {
     plot.lower_axis(&mut canvas, Some(&name));
     let below = top + all + AXIS + 4.0;
     let height = legend(&mut canvas, report, below) + MARGIN;
-    Figure::new(&format!("Accuracy: {of}"), [COLUMN, height], canvas)
+    Figure::new(&format!("Accuracy: {of}"), [style.column(), height], canvas)
 }
 
 /// Names the runs: name and seeds, or their number if they have several names.
@@ -229,7 +231,7 @@ fn legend(canvas: &mut Canvas, report: &EvalFile, top: f64) -> f64 {
             ),
         ));
     }
-    let column = (COLUMN - 2.0 * MARGIN) / 2.0;
+    let column = (canvas.style().column() - 2.0 * MARGIN) / 2.0;
     for (k, (pen, text)) in lines.iter().enumerate() {
         let at = [
             MARGIN + 4.0 + (k % 2) as f64 * column,

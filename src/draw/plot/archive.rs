@@ -6,9 +6,11 @@ use crate::draw::colour::Colour;
 use crate::draw::plot::axes::{Axis, MARGIN, colour_bar, heading};
 use crate::draw::plot::canvas::{Canvas, Pen, Piece, TEXT, TextStyle};
 use crate::draw::plot::cells::{Cell, CellMap, Panel, TaskMap, colour as colour_of};
-use crate::draw::plot::figure::{COLUMN, Figure, PAGE};
+use crate::draw::plot::figure::Figure;
+use crate::draw::plot::style::Style;
 use crate::draw::plot::{robot, scales};
-use crate::draw::{colour, fonts};
+use crate::draw::colour;
+use crate::draw::fonts::Font;
 use crate::store::run::RunFile;
 use std::collections::BTreeMap;
 
@@ -26,10 +28,13 @@ const SIDES: [f64; 2] = [3.0, 9.5];
 const LEGEND: [f64; 2] = [80.0, 76.0];
 
 /// Plots the fitness of the elites of a run: a map per task, with a panel per bin of total voxels.
-pub fn archive(run: &RunFile) -> Figure {
+pub fn archive(run: &RunFile, style: &Style) -> Figure {
     let map = CellMap::of(run);
     let is_single = map.tasks.len() == 1;
-    let (columns, width) = if is_single { (1, COLUMN) } else { (2, PAGE) };
+    let (columns, width) = match is_single {
+        true => (1, style.column()),
+        false => (style.panels(2), style.page()),
+    };
     let of = format!(
         "{}, seed {}, generation {}; {} of {} cells",
         run.name,
@@ -38,12 +43,12 @@ pub fn archive(run: &RunFile) -> Figure {
         run.stats.num_elites,
         run.dimensions.possible_cells
     );
-    let mut canvas = Canvas::new();
+    let mut canvas = Canvas::new(style);
     let top = heading(&mut canvas, "Fitness of the elites", &of, width) + 2.0;
     let room = (width - 2.0 * MARGIN + GAP) / columns as f64 - GAP;
     // A single map leaves room for the legend beside its last panels.
     let lines = if is_single { 2 } else { 1 };
-    let layout = Layout::new(&map.tasks[0].panels, room, lines);
+    let layout = Layout::new(&map.tasks[0].panels, style.font(), room, lines);
     let above = if is_single { 0.0 } else { NAME };
     let pitch = above + layout.height + 4.0;
     let place = |number: usize| {
@@ -96,11 +101,11 @@ struct Layout {
 impl Layout {
     /// Lays panels out in at most so many lines, with cells as large as possible; in more lines
     /// where the smallest ones do not fit.
-    fn new(panels: &[Panel], room: f64, lines: usize) -> Self {
+    fn new(panels: &[Panel], font: &Font, room: f64, lines: usize) -> Self {
         let [least, most] = SIDES;
         let mut cell = most;
         loop {
-            let (layout, count) = Layout::with_cells(panels, room, cell);
+            let (layout, count) = Layout::with_cells(panels, font, room, cell);
             let fits = lines == 1 || layout.free[0] + LEGEND[0] <= room;
             if (count <= lines && fits) || cell <= least {
                 return layout;
@@ -110,7 +115,7 @@ impl Layout {
     }
 
     /// Lays panels out with cells of a side. Also returns the number of lines.
-    fn with_cells(panels: &[Panel], room: f64, cell: f64) -> (Self, usize) {
+    fn with_cells(panels: &[Panel], font: &Font, room: f64, cell: f64) -> (Self, usize) {
         let (mut corners, mut line, mut x, mut y) = (Vec::new(), Vec::new(), 0.0, 0.0);
         let (mut count, mut highest) = (1, 0.0f64);
         for (number, panel) in panels.iter().enumerate() {
@@ -121,7 +126,7 @@ impl Layout {
                 0.0
             };
             let wide = cell * panel.columns() as f64;
-            let needed = before + wide.max(fonts::width(&panel.total(), TEXT, false));
+            let needed = before + wide.max(font.width(&panel.total(), TEXT, false));
             if x > 0.0 && x + needed > room {
                 y += ABOVE + highest + GAP;
                 corners.extend(line.drain(..).map(|x| [x, y - GAP]));
@@ -198,7 +203,7 @@ impl Layout {
         let [wide, high] = [panel.columns(), panel.rows.len()].map(|count| cell * count as f64);
         canvas.line([x, y], [x + wide, y], pen);
         canvas.line([x, y], [x, y - high], pen);
-        let widest = |edge: &usize| fonts::width(&edge.to_string(), TEXT, false);
+        let widest = |edge: &usize| canvas.font().width(&edge.to_string(), TEXT, false);
         let widest = edges.iter().map(widest).fold(0.0, f64::max);
         let every = ((widest + 3.0) / cell).ceil().max(1.0) as usize;
         for (bin, edge) in edges.iter().enumerate() {
@@ -219,7 +224,7 @@ impl Layout {
             }
         }
         // A name that is longer than its axis begins with it.
-        let names = [x + wide / 2.0, x + 0.5 * fonts::width(MUSCLES, TEXT, false)];
+        let names = [x + wide / 2.0, x + 0.5 * canvas.font().width(MUSCLES, TEXT, false)];
         let at = [names[0].min(names[1]), y + 18.0];
         canvas.text(at, MUSCLES, TextStyle::middle());
         let upwards = TextStyle {
@@ -272,8 +277,8 @@ fn legend(canvas: &mut Canvas, [x, y]: [f64; 2], map: &CellMap) {
     let axis = Axis::exact(0.0, if highest > 0.0 { highest } else { 1.0 }, 5);
     let colour = |value| colour_of(value, axis.to);
     let wide = LEGEND[0] - 6.0;
-    colour_bar(canvas, [x, y + 7.0], wide, &axis, &name, colour);
-    let mut top = y + 30.0;
+    let lower = colour_bar(canvas, [x, y + 7.0], [wide, LEGEND[0]], &axis, &name, colour);
+    let mut top = y + lower + 30.0;
     let mut line = |canvas: &mut Canvas, fill: Colour, text: &str| {
         let at = [x, top];
         top = robot::legend(canvas, at, [(Material::Empty, fill, text)], LEGEND[0]);

@@ -3,8 +3,9 @@
 use crate::base::number;
 use crate::draw::colour;
 use crate::draw::colour::Colour;
+use crate::draw::fonts::Font;
 use crate::draw::plot::canvas::{Canvas, HEADING, Pen, TEXT, TextStyle};
-use crate::draw::{fonts, plot::scales};
+use crate::draw::plot::scales;
 
 /// Line of an axis, points.
 const LINE: f64 = 0.6;
@@ -97,11 +98,11 @@ impl Axis {
     }
 
     /// Returns the width of the widest tick label, points.
-    pub(crate) fn labels_width(&self) -> f64 {
+    pub(crate) fn labels_width(&self, font: &Font) -> f64 {
         let widths = self
             .ticks()
             .into_iter()
-            .map(|tick| fonts::width(&self.label(tick), TEXT, false));
+            .map(|tick| font.width(&self.label(tick), TEXT, false));
         widths.fold(0.0, f64::max)
     }
 
@@ -184,7 +185,8 @@ impl Plot {
     }
 
     pub(crate) fn left_axis(&self, canvas: &mut Canvas, name: &str) {
-        self.left_axis_beside(canvas, name, self.y.labels_width());
+        let labels = self.y.labels_width(canvas.font());
+        self.left_axis_beside(canvas, name, labels);
     }
 
     /// Draws the left axis with a fixed room for labels, so that names of stacked plots line up.
@@ -218,7 +220,8 @@ pub(crate) fn left_space(labels: f64) -> f64 {
     labels + TICK + GAP + 4.0 + TEXT + 2.0
 }
 
-/// Draws the title (bold) and the subject `of` below; returns the y below them.
+/// Draws the title (bold) and the subject `of` below, unless the style leaves them out; returns the
+/// y below them.
 pub(crate) fn heading(canvas: &mut Canvas, title: &str, of: &str, width: f64) -> f64 {
     heading_in_lines(canvas, title, of, width, 1)
 }
@@ -232,6 +235,9 @@ pub(crate) fn heading_in_lines(
     count: usize,
 ) -> f64 {
     const LINE: f64 = 9.5;
+    if !canvas.style().has_title() {
+        return MARGIN;
+    }
     let most = width - 2.0 * MARGIN;
     canvas.fitted(
         [MARGIN, MARGIN + 7.0],
@@ -243,7 +249,7 @@ pub(crate) fn heading_in_lines(
         }
         .bold(),
     );
-    let lines = fonts::lines(of, TEXT, false, most, count);
+    let lines = canvas.font().lines(of, TEXT, false, most, count);
     for (k, line) in lines.iter().enumerate() {
         let at = [MARGIN, MARGIN + 17.0 + LINE * k as f64];
         canvas.text(at, line, TextStyle::default().colour(colour::FAINT));
@@ -254,17 +260,24 @@ pub(crate) fn heading_in_lines(
 /// Margin at the figure's edges, points.
 pub(crate) const MARGIN: f64 = 5.0;
 
-/// Draws a horizontal bar of colours with its axis below and its name above.
+/// Draws a horizontal bar of colours with its axis below and its name above, in up to three lines of
+/// `room` points; returns the height of the further lines, by which the bar is lower.
 pub(crate) fn colour_bar(
     canvas: &mut Canvas,
     [x, y]: [f64; 2],
-    width: f64,
+    [width, room]: [f64; 2],
     axis: &Axis,
     name: &str,
     colour_of: impl Fn(f64) -> Colour,
-) {
+) -> f64 {
     const STEPS: u32 = 64;
-    canvas.text([x, y - 3.0], name, TextStyle::default());
+    const LINE: f64 = 9.5;
+    let lines = canvas.font().lines(name, TEXT, false, room, 3);
+    for (k, line) in lines.iter().enumerate() {
+        canvas.text([x, y - 3.0 + LINE * k as f64], line, TextStyle::default());
+    }
+    let further = LINE * (lines.len() - 1) as f64;
+    let y = y + further;
     let size = [width, 6.0];
     for k in 0..STEPS {
         let share = |k: u32| f64::from(k) / f64::from(STEPS);
@@ -290,6 +303,7 @@ pub(crate) fn colour_bar(
             TextStyle::middle(),
         );
     }
+    further
 }
 
 #[cfg(test)]

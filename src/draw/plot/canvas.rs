@@ -3,7 +3,8 @@
 use crate::base::text::shortened;
 use crate::draw::colour;
 use crate::draw::colour::Colour;
-use crate::draw::fonts;
+use crate::draw::fonts::Font;
+use crate::draw::plot::style::Style;
 
 /// Maximum number of characters in a text.
 const MOST: usize = 400;
@@ -150,16 +151,42 @@ pub(crate) enum Piece {
 /// A picture under construction: its elements in drawing order, in points.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Canvas {
+    style: Style,
     elements: Vec<Element>,
 }
 
 impl Canvas {
-    pub(crate) fn new() -> Self {
-        Canvas::default()
+    pub(crate) fn new(style: &Style) -> Self {
+        Canvas {
+            style: style.clone(),
+            elements: Vec::new(),
+        }
+    }
+
+    pub(super) fn style(&self) -> &Style {
+        &self.style
+    }
+
+    pub(super) fn font(&self) -> &Font {
+        self.style.font()
     }
 
     pub(super) fn elements(&self) -> &[Element] {
         &self.elements
+    }
+
+    /// Returns all texts, and whether they are bold.
+    pub(super) fn texts(&self) -> Vec<(&str, bool)> {
+        fn of(element: &Element) -> Vec<(&str, bool)> {
+            match element {
+                Element::Text { text, words, .. } => vec![(text.as_str(), words.bold)],
+                Element::Faded { content, .. } | Element::Clipped { content, .. } => {
+                    content.texts()
+                }
+                _ => Vec::new(),
+            }
+        }
+        self.elements.iter().flat_map(of).collect()
     }
 
     pub(crate) fn rectangle(&mut self, at: [f64; 2], size: [f64; 2], fill: Colour) {
@@ -219,23 +246,20 @@ impl Canvas {
 
     /// Draws a text, cut to fit into `most` points.
     pub(crate) fn fitted(&mut self, at: [f64; 2], text: &str, most: f64, words: TextStyle) {
-        self.text(
-            at,
-            &fonts::fitted(text, words.size, words.bold, most),
-            words,
-        );
+        let text = self.font().fitted(text, words.size, words.bold, most);
+        self.text(at, &text, words);
     }
 
     /// Draws the content of `draw` with an opacity as a whole.
     pub(crate) fn faded(&mut self, opacity: f64, draw: impl FnOnce(&mut Canvas)) {
-        let mut content = Canvas::new();
+        let mut content = Canvas::new(&self.style);
         draw(&mut content);
         self.elements.push(Element::Faded { opacity, content });
     }
 
     /// Draws the content of `draw`, clipped to a rectangle; coordinates stay those of the figure.
     pub(crate) fn clipped(&mut self, at: [f64; 2], size: [f64; 2], draw: impl FnOnce(&mut Canvas)) {
-        let mut content = Canvas::new();
+        let mut content = Canvas::new(&self.style);
         draw(&mut content);
         self.elements.push(Element::Clipped { at, size, content });
     }
@@ -259,10 +283,11 @@ pub(super) fn printable(letter: char) -> char {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::draw::plot::svg::Words;
 
     #[test]
     fn lines_are_broken_where_there_is_no_number() {
-        let mut canvas = Canvas::new();
+        let mut canvas = Canvas::default();
         let nan = f64::NAN;
         let points = [
             [0.0, 0.0],
@@ -274,6 +299,6 @@ mod tests {
             [5.0, 5.0],
         ];
         canvas.polyline(&points, Pen::new(colour::INK, 1.0));
-        assert!(canvas.svg().contains("d=\"M0 0L1 1M3 1L4 1\""));
+        assert!(canvas.svg(Words::Text).contains("d=\"M0 0L1 1M3 1L4 1\""));
     }
 }

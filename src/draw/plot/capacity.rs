@@ -5,8 +5,9 @@ use crate::baseline::curve::Crossing;
 use crate::draw::colour;
 use crate::draw::plot::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};
 use crate::draw::plot::canvas::{Anchor, Canvas, Pen, TextStyle};
-use crate::draw::plot::figure::{COLUMN, Figure, PAGE};
-use crate::draw::{fonts, plot::scales};
+use crate::draw::plot::figure::Figure;
+use crate::draw::plot::scales;
+use crate::draw::plot::style::Style;
 use crate::store::capacity::{CapacityFile, Curve, Point, TaskCapacity};
 
 /// Height of a panel, points.
@@ -31,18 +32,18 @@ const CROSSING: Pen = Pen {
 
 /// Plots the mean accuracy of networks over their size with its standard deviation, the quadratic
 /// fit, the robots' accuracy and where the two meet; a panel per task and kind of network.
-pub(crate) fn capacity(file: &CapacityFile) -> Figure {
+pub(crate) fn capacity(file: &CapacityFile, style: &Style) -> Figure {
     let panels: Vec<(&TaskCapacity, &Curve)> = file
         .tasks
         .iter()
         .flat_map(|task| task.curves.iter().map(move |curve| (task, curve)))
         .collect();
     let (columns, width) = if panels.len() <= 1 {
-        (1, COLUMN)
+        (1, style.column())
     } else {
-        (2, PAGE)
+        (style.panels(2), style.page())
     };
-    let mut canvas = Canvas::new();
+    let mut canvas = Canvas::new(style);
     let stopped = if file.stopped {
         "; stopped before the end"
     } else {
@@ -51,7 +52,7 @@ pub(crate) fn capacity(file: &CapacityFile) -> Figure {
     let of = format!("{}; {}; {}{stopped}", file.run, file.selected, file.dataset);
     let top = heading(&mut canvas, "Morphological cognition capacity", &of, width);
     let y = accuracies(&panels);
-    let space = left_space(y.labels_width());
+    let space = left_space(y.labels_width(style.font()));
     let wide = (width - 2.0 * MARGIN) / columns as f64;
     let high = 14.0 + PANEL + AXIS + 6.0;
     for (k, (task, curve)) in panels.iter().enumerate() {
@@ -134,10 +135,13 @@ fn panel(
         ),
     };
     // Half of the room is for the words beside the title.
-    let title = fonts::fitted(&task.task, TextStyle::default().size, true, 0.4 * size[0]);
+    let bold = TextStyle::default().bold();
+    let title = canvas
+        .font()
+        .fitted(&task.task, bold.size, true, 0.4 * size[0]);
     let title = format!("{title}, {kind}");
-    canvas.text([at[0], at[1] - 5.0], &title, TextStyle::default().bold());
-    let left = fonts::width(&title, TextStyle::default().size, true) + 6.0;
+    canvas.text([at[0], at[1] - 5.0], &title, bold);
+    let left = canvas.font().width(&title, bold.size, true) + 6.0;
     canvas.fitted(
         [at[0] + left, at[1] - 5.0],
         &found,
@@ -198,7 +202,7 @@ fn legend(canvas: &mut Canvas, trainings: usize, [x, top]: [f64; 2], width: f64)
             anchor: Anchor::Start,
             ..TextStyle::default()
         };
-        let wide = 17.0 + fonts::width(text, words.size, false) + 12.0;
+        let wide = 17.0 + canvas.font().width(text, words.size, false) + 12.0;
         if at > x && at + wide > width - MARGIN {
             (at, y) = (x, y + 11.0);
         }
@@ -255,16 +259,20 @@ mod tests {
 
     #[test]
     fn every_task_and_network_has_a_panel_with_its_capacity() {
-        let svg = capacity(&file(Some(Crossing::At(16.8)))).svg();
+        let svg = capacity(&file(Some(Crossing::At(16.8))), &Style::default()).svg();
         assert_eq!(svg.matches("capacity 17 (14–21)").count(), 4);
         assert!(
             svg.contains("01|23, CNN") && svg.contains("hidden neurons") && svg.contains("kernels")
         );
-        assert!(capacity(&file(None)).svg().contains("never reaches"));
+        assert!(
+            capacity(&file(None), &Style::default())
+                .svg()
+                .contains("never reaches")
+        );
         // The robots are worse than any network: nothing crosses, so nothing is marked.
         let mut below = file(Some(Crossing::Below { below: 1.0 }));
         below.tasks.iter_mut().for_each(|task| task.accuracy = 0.3);
-        let below = capacity(&below).svg();
+        let below = capacity(&below, &Style::default()).svg();
         assert!(
             below.contains("capacity &lt; 1: the curve begins above")
                 && !below.contains("capacity 1")
@@ -281,8 +289,12 @@ mod tests {
         empty.tasks[0].curves[0].points.clear();
         empty.tasks[0].curves[1].fit = None;
         empty.tasks.truncate(1);
-        assert!(capacity(&empty).svg().contains("0|1, CNN"));
+        assert!(
+            capacity(&empty, &Style::default())
+                .svg()
+                .contains("0|1, CNN")
+        );
         empty.tasks.clear();
-        assert!(capacity(&empty).png(72).is_ok());
+        assert!(capacity(&empty, &Style::default()).png(72).is_ok());
     }
 }

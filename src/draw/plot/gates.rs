@@ -9,9 +9,10 @@ use crate::draw::panel::present;
 use crate::draw::plot::axes::{Axis, MARGIN, colour_bar, heading};
 use crate::draw::plot::canvas::{Canvas, Pen, TextStyle};
 use crate::draw::plot::figure::{Figure, PAGE};
+use crate::draw::plot::style::Style;
 use crate::draw::plot::{robot, scales};
 
-/// Panels beside each other.
+/// Panels beside each other on a page.
 const COLUMNS: usize = 4;
 
 /// Gap between panels, points.
@@ -30,22 +31,28 @@ const ROW: f64 = 9.0;
 const STRONG: f64 = 10.0;
 
 /// Plots gates; `of` names their run.
-pub(crate) fn gates(all: &[GateWalks], of: &str) -> Figure {
-    let mut canvas = Canvas::new();
-    let top = heading(&mut canvas, "Logic gates without a neuron", of, PAGE) + 2.0;
-    let panel = (PAGE - 2.0 * MARGIN - GAP * (COLUMNS - 1) as f64) / COLUMNS as f64;
+pub(crate) fn gates(all: &[GateWalks], of: &str, style: &Style) -> Figure {
+    let mut canvas = Canvas::new(style);
+    let top = heading(
+        &mut canvas,
+        "Logic gates without a neuron",
+        of,
+        style.page(),
+    ) + 2.0;
+    let columns = style.panels(COLUMNS);
+    let panel = (style.page() - 2.0 * MARGIN - GAP * (columns - 1) as f64) / COLUMNS as f64;
     let side = (panel - CUES - 6.0) / 2.0;
     let tall = WORDS + side + CUES + 5.0 * ROW + GAP;
     for (number, gate) in all.iter().enumerate() {
         let at = [
-            MARGIN + (number % COLUMNS) as f64 * (panel + GAP),
-            top + (number / COLUMNS) as f64 * tall,
+            MARGIN + (number % columns) as f64 * (panel + GAP),
+            top + (number / columns) as f64 * tall,
         ];
         draw(&mut canvas, at, [panel, side], gate);
     }
-    let rows = all.len().div_ceil(COLUMNS);
+    let rows = all.len().div_ceil(columns);
     let below = top + rows as f64 * tall;
-    let number = all.len() % COLUMNS;
+    let number = all.len() % columns;
     if number > 0 {
         // The place that is left.
         let at = [MARGIN + number as f64 * (panel + GAP), below - tall + WORDS];
@@ -61,8 +68,16 @@ pub(crate) fn gates(all: &[GateWalks], of: &str) -> Figure {
     let axis = Axis::exact(-STRONG, STRONG, 4);
     let shade = |walk: f64| scales::diverging(walk / STRONG);
     let bar = [MARGIN + 6.0, below];
-    colour_bar(&mut canvas, bar, PAGE / 2.0, &axis, name, shade);
-    let size = [PAGE, below + 19.0 + MARGIN];
+    let room = style.page() - 2.0 * MARGIN - 6.0;
+    let further = colour_bar(
+        &mut canvas,
+        bar,
+        [room.min(PAGE / 2.0), room],
+        &axis,
+        name,
+        shade,
+    );
+    let size = [style.page(), below + further + 19.0 + MARGIN];
     Figure::new(&format!("Logic gates: {of}"), size, canvas)
 }
 

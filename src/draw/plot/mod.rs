@@ -1,7 +1,8 @@
 //! Figures for print and pages. Each is a function from its data to a [`Figure`].
 //!
-//! `canvas` holds the elements, `svg` and `pixels` render them; figures share `axes` and `scales`;
-//! `robot` draws bodies. Sizes fit a journal's column or page; words have 7 points, captions less.
+//! `canvas` holds the elements, `svg`, `pixels` and `pdf` render them; figures share `axes` and
+//! `scales`; `robot` draws bodies; `style` holds what users choose. Sizes fit a journal's column or
+//! page, unless a width is chosen; words have 7 points at any width.
 
 mod accuracy;
 mod archive;
@@ -13,6 +14,7 @@ pub(crate) mod cells;
 mod comparison;
 mod figure;
 mod gates;
+mod pdf;
 mod pixels;
 mod progress;
 mod response;
@@ -20,6 +22,7 @@ pub(super) mod robot;
 mod scales;
 mod snapshots;
 mod spacetime;
+mod style;
 mod svg;
 mod sweep;
 mod team;
@@ -36,5 +39,7 @@ pub(crate) use progress::progress;
 pub(crate) use response::response;
 pub(crate) use snapshots::snapshots;
 pub(crate) use spacetime::spacetime;
+pub(crate) use style::MILLIMETRES;
+pub use style::Style;
 pub(crate) use sweep::sweep;
 pub use team::{confusion, poster};

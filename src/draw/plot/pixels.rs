@@ -1,6 +1,6 @@
 //! Renders a [`Canvas`] to pixels.
 
-use crate::draw::fonts;
+use crate::draw::fonts::Font;
 use crate::draw::plot::canvas::{Anchor, Canvas, Element, Ink, Pen, Piece, TextStyle, drawable};
 use crate::draw::raster::paint;
 use tiny_skia::{
@@ -42,7 +42,9 @@ impl Canvas {
                         );
                     }
                 }
-                Element::Text { at, text, words } => lettered(pixmap, *at, text, words, to_pixels),
+                Element::Text { at, text, words } => {
+                    lettered(pixmap, self.font(), *at, text, words, to_pixels);
+                }
                 Element::Faded { opacity, content } => {
                     let (width, height) = (pixmap.width() as f32, pixmap.height() as f32);
                     let whole = Rect::from_xywh(0.0, 0.0, width, height);
@@ -121,12 +123,13 @@ fn inked(pixmap: &mut Pixmap, path: &Path, ink: &Ink, line_join: LineJoin, to_pi
 
 fn lettered(
     pixmap: &mut Pixmap,
+    font: &Font,
     at: [f64; 2],
     text: &str,
     words: &TextStyle,
     to_pixels: Transform,
 ) {
-    let (letters, width) = fonts::letters(text, words.size, words.bold);
+    let (letters, width) = font.letters(text, words.size, words.bold);
     let before = match words.anchor {
         Anchor::Start => 0.0,
         Anchor::Middle => width / 2.0,

@@ -5,8 +5,9 @@ use crate::draw::colour;
 use crate::draw::colour::Colour;
 use crate::draw::plot::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};
 use crate::draw::plot::canvas::{Canvas, Pen, Piece, TEXT, TextStyle};
-use crate::draw::plot::figure::{COLUMN, Figure};
+use crate::draw::plot::figure::Figure;
 use crate::draw::plot::scales;
+use crate::draw::plot::style::Style;
 use crate::store::metrics::Moment;
 
 /// Height of a panel, points.
@@ -40,9 +41,9 @@ const DASHES: [Option<[f64; 2]>; 4] = [None, Some([4.0, 1.6]), Some([1.0, 1.6]),
 /// Plots the QD score, coverage and best fitness of runs over their evaluations. Runs that differ
 /// only in the seed become one line, their median, in a band from the least to the largest value,
 /// up to the end of the shortest. Other runs have lines and colours of their own.
-pub(crate) fn progress(runs: &[Progress]) -> Figure {
+pub(crate) fn progress(runs: &[Progress], style: &Style) -> Figure {
     let (_, groups) = group_by_settings(runs);
-    let mut canvas = Canvas::new();
+    let mut canvas = Canvas::new(style);
     let of = names(runs);
     let is_band = groups.iter().any(|group| group.runs.len() > 1);
     let title = if is_band {
@@ -50,7 +51,7 @@ pub(crate) fn progress(runs: &[Progress]) -> Figure {
     } else {
         "Progress"
     };
-    let mut top = heading(&mut canvas, title, &of, COLUMN) + 4.0;
+    let mut top = heading(&mut canvas, title, &of, style.column()) + 4.0;
     let ends: Vec<f64> = groups.iter().map(end).collect();
     let x = Axis::exact(0.0, ends.iter().copied().fold(1.0, f64::max), 4);
     let panels: Vec<(Quantity, Vec<Vec<Band>>, Axis)> = QUANTITIES
@@ -73,12 +74,12 @@ pub(crate) fn progress(runs: &[Progress]) -> Figure {
         .collect();
     let labels = panels
         .iter()
-        .map(|(_, _, y)| y.labels_width())
+        .map(|(_, _, y)| y.labels_width(style.font()))
         .fold(0.0, f64::max);
     let left = MARGIN + left_space(labels);
     let count = panels.len();
     for (k, ((name, _, colour), bands, y)) in panels.into_iter().enumerate() {
-        let size = [COLUMN - MARGIN - 8.0 - left, PANEL];
+        let size = [style.column() - MARGIN - 8.0 - left, PANEL];
         let plot = Plot {
             at: [left, top],
             size,
@@ -111,7 +112,7 @@ pub(crate) fn progress(runs: &[Progress]) -> Figure {
         .filter(|unit| runs.iter().all(|run| run.unit == Some(unit)))
     {
         canvas.text(
-            [COLUMN - MARGIN, height - MARGIN - 2.0],
+            [style.column() - MARGIN, height - MARGIN - 2.0],
             &format!("fitness: {unit}"),
             note,
         );
@@ -119,7 +120,7 @@ pub(crate) fn progress(runs: &[Progress]) -> Figure {
     if groups.len() > 1 {
         height = legend(&mut canvas, &groups, height + 2.0) + MARGIN;
     }
-    Figure::new(&format!("Progress: {of}"), [COLUMN, height], canvas)
+    Figure::new(&format!("Progress: {of}"), [style.column(), height], canvas)
 }
 
 /// Returns the evaluations that all runs of a group reach.
@@ -157,12 +158,8 @@ fn legend(canvas: &mut Canvas, groups: &[SettingsGroup], top: f64) -> f64 {
             count => format!("{count} seeds"),
         };
         let text = format!("{} ({seeds})", group.label);
-        canvas.fitted(
-            [MARGIN + 22.0, y],
-            &text,
-            COLUMN - 2.0 * MARGIN - 22.0,
-            TextStyle::default(),
-        );
+        let room = canvas.style().column() - 2.0 * MARGIN - 22.0;
+        canvas.fitted([MARGIN + 22.0, y], &text, room, TextStyle::default());
     }
     if groups.len() > NAMED {
         y += 10.0;
@@ -318,10 +315,18 @@ mod tests {
             }
         };
         let runs: Vec<Progress> = (0..30).map(of).collect();
-        let svg = progress(&runs[..2]).svg();
+        let svg = progress(&runs[..2], &Style::default()).svg();
         assert!(svg.contains("parents=0 (seed 1)") && svg.contains("parents=1 (seed 1)"));
-        assert!(progress(&runs).svg().contains("and 6 more"));
-        assert!(!progress(&runs[..1]).svg().contains("parents"));
+        assert!(
+            progress(&runs, &Style::default())
+                .svg()
+                .contains("and 6 more")
+        );
+        assert!(
+            !progress(&runs[..1], &Style::default())
+                .svg()
+                .contains("parents")
+        );
         assert_eq!(names(&runs), "toy, seed 1");
     }
 
@@ -342,7 +347,11 @@ mod tests {
             vec![run(1, &[None])],
             vec![run(1, &[None, None]), run(2, &[Some(1.0)])],
         ] {
-            assert!(progress(&runs).svg().contains("evaluations"));
+            assert!(
+                progress(&runs, &Style::default())
+                    .svg()
+                    .contains("evaluations")
+            );
         }
     }
 }

@@ -8,23 +8,30 @@ use crate::draw::panel::present;
 use crate::draw::plot::axes::{Axis, MARGIN, colour_bar, heading};
 use crate::draw::plot::canvas::{Canvas, Pen, Piece, TextStyle};
 use crate::draw::plot::figure::{COLUMN, Figure};
+use crate::draw::plot::style::Style;
 use crate::draw::plot::{robot, scales};
 use crate::store::response::{EndedBy, RobotResponse};
 
-/// Side of the map, points.
-const MAP: f64 = 132.0;
+/// Side of the map as a share of the width.
+const MAP: f64 = 132.0 / COLUMN;
 
 /// The share of a material's colour that remains, so that the slopes' colours stand out.
 const FADED: f64 = 0.55;
 
 /// Plots the slopes of a robot's soft voxels and sensors over its body. `of` names the robot,
 /// `task` the task that `taught` estimates.
-pub(crate) fn response(found: &RobotResponse, task: Option<&str>, of: &str) -> Figure {
-    let mut canvas = Canvas::new();
+pub(crate) fn response(
+    found: &RobotResponse,
+    task: Option<&str>,
+    of: &str,
+    style: &Style,
+) -> Figure {
+    let mut canvas = Canvas::new(style);
     let body = &found.body;
-    let top = heading(&mut canvas, "Response", of, COLUMN) + 2.0;
+    let top = heading(&mut canvas, "Response", of, style.column()) + 2.0;
     let at = [MARGIN + 1.0, top];
-    let cell = MAP / body.height().max(body.width()).max(1) as f64;
+    let map = MAP * style.column();
+    let cell = map / body.height().max(body.width()).max(1) as f64;
     let size = [cell * body.width() as f64, cell * body.height() as f64];
     canvas.frame(at, size, Pen::new(scales::GRID, 0.6));
     let largest = found
@@ -84,8 +91,8 @@ pub(crate) fn response(found: &RobotResponse, task: Option<&str>, of: &str) -> F
     }
     robot::body_outline(&mut canvas, at, cell, body, Pen::new(colour::INK, 0.8));
 
-    let x = at[0] + MAP + 10.0;
-    let room = COLUMN - MARGIN - x;
+    let x = at[0] + map + 10.0;
+    let room = style.column() - MARGIN - x;
     let materials = present(body).filter(|material| !is_place(material));
     let lines: Vec<(Material, Colour, &str)> = materials
         .map(|m| (m, faded(robot::plain(m)), m.name()))
@@ -113,11 +120,18 @@ pub(crate) fn response(found: &RobotResponse, task: Option<&str>, of: &str) -> F
     let below = (top + size[1]).max(y - 6.0) + 17.0;
     let axis = Axis::exact(-largest, largest, 4);
     let name = "displacement per rest width of a place [voxel lengths], right positive";
-    let bar = COLUMN - 2.0 * MARGIN - 12.0;
-    colour_bar(&mut canvas, [MARGIN + 6.0, below], bar, &axis, name, shade);
+    let bar = style.column() - 2.0 * MARGIN - 12.0;
+    let further = colour_bar(
+        &mut canvas,
+        [MARGIN + 6.0, below],
+        [bar, bar + 6.0],
+        &axis,
+        name,
+        shade,
+    );
     Figure::new(
         &format!("Response: {of}"),
-        [COLUMN, below + 19.0 + MARGIN],
+        [style.column(), below + further + 19.0 + MARGIN],
         canvas,
     )
 }
@@ -205,6 +219,7 @@ mod tests {
             &found([(8.0, 1.0), (-4.0, 1.0), (1.0, 1.0)]),
             None,
             "robot a",
+            &Style::default(),
         )
         .svg();
         for slope in [1.0, -0.5, 0.125] {
@@ -220,6 +235,7 @@ mod tests {
             &found([(8.0, 1.0), (-4.0, 1.0), (3.0, 1.0)]),
             None,
             "robot a",
+            &Style::default(),
         )
         .svg();
         assert_eq!(crosses(&certain), 1);
@@ -235,7 +251,7 @@ mod tests {
     #[test]
     fn a_gait_that_does_not_move_has_a_map_too_and_a_task_is_told() {
         let mut still = found([(0.0, 0.0); 3]);
-        let svg = response(&still, Some("4|9"), "robot a").svg();
+        let svg = response(&still, Some("4|9"), "robot a", &Style::default()).svg();
         assert!(svg.contains(&scales::diverging(0.0).hex()) && !svg.contains("4|9"));
         let interval = [0.612, 0.748];
         still.taught = Some(TrainingEstimate {
@@ -246,7 +262,7 @@ mod tests {
             margin: None,
         });
         assert!(
-            response(&still, Some("4|9"), "robot a")
+            response(&still, Some("4|9"), "robot a", &Style::default())
                 .svg()
                 .contains("4|9: 61–75 % correct")
         );

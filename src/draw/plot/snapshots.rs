@@ -5,8 +5,9 @@ use crate::draw::error::PictureError;
 use crate::draw::panel::signed;
 use crate::draw::plot::axes::{Axis, MARGIN, Plot, heading};
 use crate::draw::plot::canvas::{Canvas, Pen, TEXT, TextStyle};
-use crate::draw::plot::figure::{COLUMN, Figure, PAGE};
+use crate::draw::plot::figure::Figure;
 use crate::draw::plot::robot;
+use crate::draw::plot::style::Style;
 use crate::draw::walk::Walk;
 use crate::task::recording::Recording;
 
@@ -25,12 +26,16 @@ pub(crate) fn snapshots(
     recording: &Recording,
     every: usize,
     of: &str,
+    style: &Style,
 ) -> Result<Figure, PictureError> {
     let walk = Walk::new(recording)?;
     let phases = recording.phases.len();
-    let (columns, width) = if phases <= 3 { (1, COLUMN) } else { (2, PAGE) };
+    let (columns, width) = match phases {
+        0..=3 => (1, style.column()),
+        _ => (style.panels(2), style.page()),
+    };
     let every = if every == 0 { suitable(&walk) } else { every };
-    let mut canvas = Canvas::new();
+    let mut canvas = Canvas::new(style);
     let is_rest =
         (0..phases).any(|phase| !(walk.phase_frames(phase).len() - 1).is_multiple_of(every));
     let rest = if is_rest { ", and the last" } else { "" };
@@ -200,16 +205,22 @@ fn panel(canvas: &mut Canvas, walk: &Walk, phase: usize, every: usize, plot: &Pl
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::draw::plot::figure::{COLUMN, PAGE};
     use crate::draw::simulated;
 
     #[test]
     fn there_is_a_panel_per_stimulus_and_a_pose_every_so_often() {
         let recording = simulated("3344/5566", 2, 100, true);
-        let figure = snapshots(&recording, 25, "robot x").unwrap();
+        let figure = snapshots(&recording, 25, "robot x", &Style::default()).unwrap();
         assert_eq!(figure.svg().matches("<g opacity").count(), 2 * 5);
         assert!(figure.svg().contains("1 (train 3)") && figure.size()[0] == COLUMN);
         let four = simulated("3344/5566", 4, 100, true);
-        assert_eq!(snapshots(&four, 0, "robot x").unwrap().size()[0], PAGE);
+        assert_eq!(
+            snapshots(&four, 0, "robot x", &Style::default())
+                .unwrap()
+                .size()[0],
+            PAGE
+        );
     }
 
     #[test]
@@ -220,12 +231,12 @@ mod tests {
         recording.frames[5].centre = [f64::INFINITY; 2];
         recording.unstable = true;
         assert!(
-            snapshots(&recording, 1, "x")
+            snapshots(&recording, 1, "x", &Style::default())
                 .unwrap()
                 .svg()
                 .contains("unstable")
         );
         recording.frames.truncate(1);
-        assert!(snapshots(&recording, 0, "x").is_ok());
+        assert!(snapshots(&recording, 0, "x", &Style::default()).is_ok());
     }
 }

@@ -6,8 +6,9 @@ use crate::draw::error::PictureError;
 use crate::draw::panel::signed;
 use crate::draw::plot::axes::{AXIS, Axis, MARGIN, Plot, heading, left_space};
 use crate::draw::plot::canvas::{Canvas, Pen, Piece, TEXT, TextStyle};
-use crate::draw::plot::figure::{COLUMN, Figure, PAGE};
+use crate::draw::plot::figure::Figure;
 use crate::draw::plot::robot;
+use crate::draw::plot::style::Style;
 use crate::draw::walk::{Walk, area};
 use crate::task::recording::Recording;
 use std::ops::Range;
@@ -29,16 +30,24 @@ const HEIGHTS: [f64; 2] = [90.0, 210.0];
 /// Plots x over time, which runs downwards. Every row is the robot from above at that time, darker
 /// where its voxels are compressed. There is a panel per rollout, with dashed lines where the
 /// stimulus changes. `of` names the robot.
-pub(crate) fn spacetime(recording: &Recording, of: &str) -> Result<Figure, PictureError> {
+pub(crate) fn spacetime(
+    recording: &Recording,
+    of: &str,
+    style: &Style,
+) -> Result<Figure, PictureError> {
     let walk = Walk::new(recording)?;
     let mut rollouts = Vec::<Range<usize>>::new();
     while rollouts.last().map_or(0, |rollout| rollout.end) < walk.frames() {
         let rollout = walk.rollout(rollouts.last().map_or(0, |rollout| rollout.end));
         rollouts.push(rollout.start..rollout.end.max(rollout.start + 1));
     }
-    let columns = rollouts.len().min(4);
-    let width = if columns <= 2 { COLUMN } else { PAGE };
-    let mut canvas = Canvas::new();
+    let columns = rollouts.len().min(style.panels(4));
+    let width = if columns <= 2 {
+        style.column()
+    } else {
+        style.page()
+    };
+    let mut canvas = Canvas::new(style);
     let top = heading(&mut canvas, "Position over time", of, width);
     let x = positions(&walk, &rollouts, columns);
     let grays = grays(&walk, &rollouts, &x);
@@ -51,7 +60,7 @@ pub(crate) fn spacetime(recording: &Recording, of: &str) -> Result<Figure, Pictu
     let cycle = recording.cycle.max(1) as f64;
     let y = Axis::exact(0.0, longest as f64 / cycle, 5);
     let height = (PER_STEP * longest as f64).clamp(HEIGHTS[0], HEIGHTS[1]);
-    let left = MARGIN + left_space(y.labels_width());
+    let left = MARGIN + left_space(y.labels_width(style.font()));
     // A single rollout has its stimuli beside it, several have them above.
     let (beside, above) = if rollouts.len() == 1 {
         (STIMULUS + 8.0, 4.0)
@@ -292,7 +301,7 @@ fn axes(canvas: &mut Canvas, plot: &Plot, is_first: bool) {
         }
     }
     if is_first {
-        let x = left - 8.5 - plot.y.labels_width();
+        let x = left - 8.5 - plot.y.labels_width(canvas.font());
         let words = TextStyle {
             upwards: true,
             ..TextStyle::middle()
@@ -314,7 +323,9 @@ mod tests {
     fn fresh_rollouts_have_a_panel_each_and_a_continuous_one_has_a_dashed_line_per_change() {
         let panels = |fresh| {
             let recording = simulated("3344/5566", 3, 60, fresh);
-            let svg = spacetime(&recording, "robot x").unwrap().svg();
+            let svg = spacetime(&recording, "robot x", &Style::default())
+                .unwrap()
+                .svg();
             (
                 svg.matches("x [voxel lengths]").count(),
                 svg.matches("stroke-dasharray").count(),
@@ -348,8 +359,8 @@ mod tests {
         let mut recording = simulated("34/56", 1, 5, false);
         recording.frames[5].points[0] = [f64::NAN, 1e300];
         recording.frames[4].points[1] = [1e8, -1e8];
-        assert!(spacetime(&recording, "x").is_ok());
+        assert!(spacetime(&recording, "x", &Style::default()).is_ok());
         recording.frames.truncate(1);
-        assert!(spacetime(&recording, "x").is_ok());
+        assert!(spacetime(&recording, "x", &Style::default()).is_ok());
     }
 }

@@ -2,22 +2,46 @@
 
 use crate::base::number;
 use crate::draw::colour::Colour;
-use crate::draw::plot::canvas::{Anchor, Canvas, Element, Ink, Pen, Piece, drawable, printable};
+use crate::draw::fonts::Font;
+use crate::draw::plot::canvas::{
+    Anchor, Canvas, Element, Ink, Pen, Piece, TextStyle, drawable, printable,
+};
 use std::fmt;
+use tiny_skia::{PathSegment, Point};
+
+/// The form of the words of an SVG.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Words {
+    /// Text, for pages: it can be selected and searched, in a font that the viewer has.
+    Text,
+    /// Outlines of the canvas's font, for files: they look the same everywhere.
+    Outlines,
+}
 
 impl Canvas {
     /// Returns the elements as SVG.
-    pub fn svg(&self) -> String {
-        self.elements()
-            .iter()
-            .map(|element| format!("{element}\n"))
-            .collect()
+    pub fn svg(&self, words: Words) -> String {
+        let font = self.font();
+        let elements = self.elements().iter();
+        let elements = elements.map(|element| Drawn {
+            element,
+            font,
+            words,
+        });
+        elements.map(|element| format!("{element}\n")).collect()
     }
 }
 
-impl fmt::Display for Element {
+/// An element, and how to write its words.
+struct Drawn<'a> {
+    element: &'a Element,
+    font: &'a Font,
+    words: Words,
+}
+
+impl fmt::Display for Drawn<'_> {
     fn fmt(&self, out: &mut fmt::Formatter) -> fmt::Result {
-        match self {
+        match self.element {
             Element::Rectangle { at, size, ink } => {
                 let ([x, y], [width, height]) = (at.map(number), size.map(number));
                 write!(
@@ -42,6 +66,29 @@ impl fmt::Display for Element {
                     out,
                     "<circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\"{}/>",
                     filled(*fill)
+                )
+            }
+            Element::Text { at, text, words } if self.words == Words::Outlines => {
+                let Some((path, width)) = outlines(self.font, text, words) else {
+                    return Ok(());
+                };
+                let before = match words.anchor {
+                    Anchor::Start => 0.0,
+                    Anchor::Middle => f64::from(width) / 2.0,
+                    Anchor::End => f64::from(width),
+                };
+                let (at, turn) = match words.upwards {
+                    true => ([at[0], at[1] + before], " rotate(-90)"),
+                    false => ([at[0] - before, at[1]], ""),
+                };
+                let ([x, y], size, fill) =
+                    (at.map(number), number(words.size), filled(words.colour));
+                // The label and the size are what other programs keep of text that became outlines.
+                write!(
+                    out,
+                    "<path aria-label=\"{}\" font-size=\"{size}\" \
+                     transform=\"translate({x} {y}){turn} scale({FINE})\" d=\"{path}\"{fill}/>",
+                    escape(text)
                 )
             }
             Element::Text { at, text, words } => {
@@ -72,7 +119,7 @@ impl fmt::Display for Element {
                     out,
                     "<g opacity=\"{}\">\n{}</g>",
                     number(*opacity),
-                    content.svg()
+                    content.svg(self.words)
                 )
             }
             Element::Clipped { at, size, content } => {
@@ -82,9 +129,68 @@ impl fmt::Display for Element {
                     out,
                     "<svg x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" viewBox=\"{x} {y} {width} {height}\" \
                      overflow=\"hidden\">\n{}</svg>",
-                    content.svg()
+                    content.svg(self.words)
                 )
             }
+        }
+    }
+}
+
+/// Returns the outlines of a text as path data, from the beginning of its baseline, in units of
+/// [`FINE`]; and its width, points. A blank text has no outlines.
+fn outlines(font: &Font, text: &str, words: &TextStyle) -> Option<(String, f32)> {
+    let (path, width) = font.letters(text, words.size, words.bold);
+    let mut data = PathData::default();
+    for segment in path?.segments() {
+        match segment {
+            PathSegment::MoveTo(p) => data.step('m', &[p]),
+            PathSegment::LineTo(p) => data.step('l', &[p]),
+            PathSegment::QuadTo(a, p) => data.step('q', &[a, p]),
+            PathSegment::CubicTo(a, b, p) => data.step('c', &[a, b, p]),
+            PathSegment::Close => {
+                data.text.push('z');
+                (data.at, data.letter) = (data.start, 'z');
+            }
+        }
+    }
+    Some((data.text, width))
+}
+
+/// The unit of outlines, points: coordinates are whole numbers, which keeps files small.
+const FINE: f32 = 0.01;
+
+/// Path data under construction, with relative coordinates.
+#[derive(Default)]
+struct PathData {
+    text: String,
+    at: [i32; 2],
+    /// Where the present part of the path begins.
+    start: [i32; 2],
+    letter: char,
+}
+
+impl PathData {
+    fn step(&mut self, letter: char, points: &[Point]) {
+        if letter != self.letter {
+            self.text.push(letter);
+        }
+        let mut is_first = letter != self.letter;
+        let mut end = self.at;
+        for point in points {
+            // Differences of rounded places: errors do not add up.
+            end = [point.x, point.y].map(|v| (v / FINE).round() as i32);
+            for distance in [end[0] - self.at[0], end[1] - self.at[1]] {
+                // A minus separates numbers, too.
+                if !is_first && distance >= 0 {
+                    self.text.push(' ');
+                }
+                self.text += &distance.to_string();
+                is_first = false;
+            }
+        }
+        (self.at, self.letter) = (end, letter);
+        if letter == 'm' {
+            self.start = end;
         }
     }
 }
@@ -178,7 +284,7 @@ mod tests {
 
     #[test]
     fn every_element_has_its_svg() {
-        let mut canvas = Canvas::new();
+        let mut canvas = Canvas::default();
         let pen = Pen::new(colour::INK.with_opacity(51), 0.5);
         canvas.rectangle([1.0, 2.0], [3.0, 4.5], colour::PAPER);
         canvas.frame([1.0, 2.0], [3.0, 4.0], pen.dashed(3.0, 2.0));
@@ -228,7 +334,7 @@ mod tests {
 </g>
 </svg>
 "##;
-        assert_eq!(canvas.svg(), expected);
+        assert_eq!(canvas.svg(Words::Text), expected);
     }
 
     #[test]

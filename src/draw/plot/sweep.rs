@@ -4,8 +4,9 @@ use crate::analysis::sweep::SweepRow;
 use crate::draw::colour;
 use crate::draw::plot::axes::{AXIS, Axis, MARGIN, Plot, heading};
 use crate::draw::plot::canvas::{Canvas, Pen, TEXT, TextStyle};
-use crate::draw::plot::figure::{COLUMN, Figure};
-use crate::draw::{fonts, plot::scales};
+use crate::draw::plot::figure::Figure;
+use crate::draw::plot::scales;
+use crate::draw::plot::style::Style;
 
 /// Height of a line, points.
 const LINE: f64 = 10.5;
@@ -21,7 +22,7 @@ struct Line {
 
 /// Plots accuracy on held-out images by the varied settings: a dot per seed with its 95 % interval,
 /// the mean of several seeds, a line per task. Returns `None` if no run was tested.
-pub(crate) fn sweep(name: &str, rows: &[SweepRow]) -> Option<Figure> {
+pub(crate) fn sweep(name: &str, rows: &[SweepRow], style: &Style) -> Option<Figure> {
     let mut lines: Vec<Line> = Vec::new();
     let mut images = None;
     for row in rows {
@@ -49,16 +50,16 @@ pub(crate) fn sweep(name: &str, rows: &[SweepRow]) -> Option<Figure> {
         }
     }
     let (images, split) = images?;
-    let mut canvas = Canvas::new();
+    let mut canvas = Canvas::new(style);
     let top = heading(
         &mut canvas,
         &format!("Accuracy on {images} {split} images"),
         name,
-        COLUMN,
+        style.column(),
     ) + 2.0;
     let names = lines
         .iter()
-        .map(|line| fonts::width(&line.about, TEXT, false))
+        .map(|line| style.font().width(&line.about, TEXT, false))
         .fold(0.0, f64::max)
         .min(MOST);
     let left = MARGIN + names + 5.0;
@@ -69,7 +70,7 @@ pub(crate) fn sweep(name: &str, rows: &[SweepRow]) -> Option<Figure> {
         .flat_map(|line| line.dots.iter().map(low))
         .fold(90.0, f64::min);
     let size = [
-        COLUMN - MARGIN - 8.0 - left,
+        style.column() - MARGIN - 8.0 - left,
         LINE * lines.len() as f64 + 4.0,
     ];
     let x = Axis::nice((lowest / 5.0).floor() * 5.0, 100.0, 5);
@@ -118,7 +119,7 @@ pub(crate) fn sweep(name: &str, rows: &[SweepRow]) -> Option<Figure> {
     }
     Some(Figure::new(
         &format!("Accuracy: {name}"),
-        [COLUMN, height],
+        [style.column(), height],
         canvas,
     ))
 }

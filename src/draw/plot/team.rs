@@ -4,10 +4,11 @@ use crate::base::number::percent;
 use crate::body::{Body, Material};
 use crate::draw::colour;
 use crate::draw::colour::Colour;
-use crate::draw::fonts;
+use crate::draw::fonts::Font;
 use crate::draw::plot::axes::{MARGIN, heading};
 use crate::draw::plot::canvas::{Canvas, Pen, TEXT, TextStyle};
-use crate::draw::plot::figure::{COLUMN, Figure, PAGE};
+use crate::draw::plot::figure::{Figure, PAGE};
+use crate::draw::plot::style::Style;
 use crate::draw::plot::{robot, scales};
 use crate::store::team::{Member, TeamFile};
 use crate::task::answer::Direction;
@@ -16,7 +17,7 @@ use crate::task::class_names::ClassNames;
 /// Space between bodies, points.
 const GAP: f64 = 4.0;
 
-/// Largest side of a body, points.
+/// Largest side of a body on a page, points.
 const LARGEST: f64 = 110.0;
 
 /// Space for the caption below a body, points, and the height of its first lines.
@@ -27,10 +28,10 @@ const CAPTION_LINE: f64 = 8.2;
 const LONGEST_NAME: f64 = 90.0;
 
 /// Plots images by class and by the team's answer, most votes; returns `None` without answers.
-pub fn confusion(file: &TeamFile) -> Option<Figure> {
+pub fn confusion(file: &TeamFile, style: &Style) -> Option<Figure> {
     let votes = &file.answers.as_ref()?.votes;
     let count = file.classes.len();
-    let mut canvas = Canvas::new();
+    let mut canvas = Canvas::new(style);
     let of = format!(
         "{} robots, most votes: {} % of {} {} images",
         file.members.len(),
@@ -38,13 +39,14 @@ pub fn confusion(file: &TeamFile) -> Option<Figure> {
         file.images.len(),
         file.split
     );
+    let font = style.font();
     let widest = |texts: &mut dyn Iterator<Item = String>| {
         texts
-            .map(|text| fonts::width(&text, TEXT, false))
+            .map(|text| font.width(&text, TEXT, false))
             .fold(0.0, f64::max)
     };
     let class_names = file.names();
-    let name = |class: &u8| fonts::fitted(&class_names.name(*class), TEXT, false, LONGEST_NAME);
+    let name = |class: &u8| font.fitted(&class_names.name(*class), TEXT, false, LONGEST_NAME);
     let names = widest(&mut file.classes.iter().map(name));
     let numbers = widest(&mut votes.confusion.iter().flatten().map(usize::to_string));
     let left = MARGIN + (3.0 * TEXT).max(TEXT + names + 8.0);
@@ -53,7 +55,9 @@ pub fn confusion(file: &TeamFile) -> Option<Figure> {
     let needed = numbers.max(if is_named { TEXT } else { names });
     // With many classes the figure is as wide as names and numbers need, up to a page.
     let within = |width: f64| (width - MARGIN - left) / count as f64;
-    let side = (needed + 3.0).min(within(PAGE)).max(within(COLUMN));
+    let side = (needed + 3.0)
+        .min(within(style.page()))
+        .max(within(style.column()));
     let width = left + side * count as f64 + MARGIN;
     let is_upright = is_named && names + 2.0 > side;
     let (across, high) = if is_upright {
@@ -132,24 +136,25 @@ pub fn confusion(file: &TeamFile) -> Option<Figure> {
 /// Plots all bodies, with the classes that each tells apart and its accuracy. If every task is a
 /// pair of classes, they form a triangle, with the lower class from top to bottom and the higher
 /// from left to right. Returns `None` without robots.
-pub fn poster(file: &TeamFile) -> Option<Figure> {
+pub fn poster(file: &TeamFile, style: &Style) -> Option<Figure> {
     if file.members.is_empty() {
         return None;
     }
-    let captions = Captions::of(file);
+    let largest = LARGEST * style.page() / PAGE;
+    let captions = Captions::of(file, style.font());
     let widths = file
         .members
         .iter()
         .flat_map(|member| captions.ways(member, f64::INFINITY))
-        .map(|line| fonts::width(&line, TEXT, false));
-    let (widest, below) = (widths.fold(1.0, f64::max).min(LARGEST), captions.height());
+        .map(|line| style.font().width(&line, TEXT, false));
+    let (widest, below) = (widths.fold(1.0, f64::max).min(largest), captions.height());
     // Columns wide enough for the caption below a body.
-    let most = ((PAGE - 2.0 * MARGIN) / widest) as usize;
+    let most = ((style.page() - 2.0 * MARGIN) / widest) as usize;
     let of_pairs = triangle(file).filter(|_| file.classes.len() - 1 <= most);
     let places = of_pairs.unwrap_or_else(|| rows(file.members.len(), most));
     let columns = places.iter().map(|[column, _]| column + 1).max()?;
     let lines = places.iter().map(|[_, line]| line + 1).max()?;
-    let mut canvas = Canvas::new();
+    let mut canvas = Canvas::new(style);
     let of = match &file.answers {
         Some(answers) => {
             let accuracy = percent(answers.votes.accuracy.accuracy);
@@ -162,8 +167,13 @@ pub fn poster(file: &TeamFile) -> Option<Figure> {
         None => file.dataset.clone(),
     };
     let count = file.members.len();
-    let top = heading(&mut canvas, &format!("A team of {count} bodies"), &of, PAGE) + 4.0;
-    let side = ((PAGE - 2.0 * MARGIN) / columns as f64 - GAP).min(LARGEST);
+    let top = heading(
+        &mut canvas,
+        &format!("A team of {count} bodies"),
+        &of,
+        style.page(),
+    ) + 4.0;
+    let side = ((style.page() - 2.0 * MARGIN) / columns as f64 - GAP).min(largest);
     for (member, [column, line]) in file.members.iter().zip(&places) {
         let at = [
             MARGIN + (side + GAP) * *column as f64,
@@ -197,10 +207,10 @@ pub fn poster(file: &TeamFile) -> Option<Figure> {
     } else {
         bottom
     };
-    let below = robot::legend(&mut canvas, [MARGIN, start], names, PAGE / 3.0);
+    let below = robot::legend(&mut canvas, [MARGIN, start], names, style.page() / 3.0);
     Some(Figure::new(
         &format!("Team: {of}"),
-        [PAGE, bottom.max(below) + MARGIN],
+        [style.page(), bottom.max(below) + MARGIN],
         canvas,
     ))
 }
@@ -258,17 +268,18 @@ fn drawn(canvas: &mut Canvas, at: [f64; 2], side: f64, body: &Body) {
 }
 
 /// Writes the classes that a robot tells apart below its body, and its accuracy.
-struct Captions {
+struct Captions<'a> {
+    font: &'a Font,
     names: ClassNames,
     /// The number of lines for the classes: each side of named ones has its own.
     lines: usize,
 }
 
-impl Captions {
-    fn of(file: &TeamFile) -> Self {
+impl<'a> Captions<'a> {
+    fn of(file: &TeamFile, font: &'a Font) -> Self {
         let names = file.names();
         let lines = if names.all().is_empty() { 1 } else { 2 };
-        Captions { names, lines }
+        Captions { font, names, lines }
     }
 
     /// Returns the height of a caption, points.
@@ -306,26 +317,27 @@ impl Captions {
             (1, 0)
         };
         let groups = [a, b].map(|k| self.names.side(&member.groups[k]));
-        let width = |text: &str| fonts::width(text, TEXT, false);
+        let width = |text: &str| self.font.width(text, TEXT, false);
+        let fitted = |text: &str, most| self.font.fitted(text, TEXT, false, most);
         if self.lines == 2 {
             let room = most - width("← ");
-            let [left, right] = groups.map(|group| fonts::fitted(&group, TEXT, false, room));
+            let [left, right] = groups.map(|group| fitted(&group, room));
             return vec![format!("← {left}"), format!("{right} →")];
         }
         let with = |[left, right]: [&str; 2]| format!("← {left} | {right} →");
         let room = most - width(&with(["", ""]));
         let [left, right] = [&groups[0], &groups[1]].map(|group| width(group));
         // A side that needs less than half leaves the rest to the other.
-        let fitted = |k: usize, other: f64| {
-            fonts::fitted(&groups[k], TEXT, false, (room / 2.0).max(room - other))
-        };
-        vec![with([&fitted(0, right), &fitted(1, left)])]
+        let side = |k: usize, other: f64| fitted(&groups[k], (room / 2.0).max(room - other));
+        vec![with([&side(0, right), &side(1, left)])]
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::draw::fonts::EMBEDDED;
+    use crate::draw::plot::svg::Words;
     use crate::store::team::Accuracy;
 
     fn member() -> Member {
@@ -352,13 +364,14 @@ mod tests {
     fn a_caption_has_a_bar_between_the_classes_of_the_two_ways() {
         let mut member = member();
         let captions = Captions {
+            font: &EMBEDDED,
             names: ClassNames::default(),
             lines: 1,
         };
         let said = |member: &Member| {
-            let mut canvas = Canvas::new();
+            let mut canvas = Canvas::default();
             captions.write(&mut canvas, [50.0, 50.0], 110.0, member);
-            canvas.svg()
+            canvas.svg(Words::Text)
         };
         let ways = |member: &Member, most| captions.ways(member, most).concat();
         assert!(
@@ -379,7 +392,7 @@ mod tests {
             text.starts_with("← 1 2 3") && text.ends_with("… | 26 →"),
             "{text}"
         );
-        assert!(fonts::width(&text, TEXT, false) <= 80.0);
+        assert!(EMBEDDED.width(&text, TEXT, false) <= 80.0);
         member.groups = [(1..14).collect(), (14..27).collect()];
         let text = ways(&member, 80.0);
         assert!(
@@ -392,6 +405,7 @@ mod tests {
     fn named_classes_have_a_line_for_each_side_of_a_caption() {
         let names = ["cat", "guinea pig", "dog"].map(String::from);
         let captions = Captions {
+            font: &EMBEDDED,
             names: ClassNames::of(&names),
             lines: 2,
         };
@@ -403,7 +417,7 @@ mod tests {
             ["← cat, guinea pig", "dog →"]
         );
         for line in captions.ways(&member, 40.0) {
-            assert!(fonts::width(&line, TEXT, false) <= 40.0, "{line}");
+            assert!(EMBEDDED.width(&line, TEXT, false) <= 40.0, "{line}");
         }
     }
 }

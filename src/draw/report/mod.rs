@@ -14,7 +14,7 @@ use crate::analysis::dossier::{Dossier, Findings, Gathered};
 use crate::base::remedy::Invocation;
 use crate::draw::error::PictureError;
 use crate::draw::html::{escape, fill};
-use crate::draw::plot::Figure;
+use crate::draw::plot::{Figure, Style};
 use crate::draw::{html, plot};
 use bodies::Rollouts;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -125,7 +125,7 @@ fn overview(runs: &[Dossier], together: &Findings) -> String {
     if let Some(progress) = progress.filter(|_| !are_trained) {
         out += &format!(
             "<div class=\"figures\">{}</div>\n",
-            figure(&plot::progress(&progress), "column")
+            figure(&plot::progress(&progress, &Style::default()), "column")
         );
     }
     out += &findings(together);
@@ -163,11 +163,14 @@ fn run(
         out += &bodies::bodies(number, dossier, rollouts, spell);
         let mut figures = String::new();
         if let Some(progress) = &dossier.progress {
-            figures += &figure(&plot::progress(std::slice::from_ref(progress)), "column");
+            figures += &figure(
+                &plot::progress(std::slice::from_ref(progress), &Style::default()),
+                "column",
+            );
         }
         let tasks = dossier.run.dimensions.tasks.len();
         figures += &figure(
-            &plot::archive(&dossier.run),
+            &plot::archive(&dossier.run, &Style::default()),
             if tasks > 1 { "page" } else { "column" },
         );
         out += &format!(
@@ -194,7 +197,7 @@ fn findings(found: &Findings) -> String {
         out += &tables::eval(report);
         out += &format!(
             "<div class=\"figures\">{}</div>\n",
-            figure(&plot::accuracy(report), "column")
+            figure(&plot::accuracy(report, &Style::default()), "column")
         );
     }
     if let Some(audit) = &found.audit {
@@ -210,7 +213,7 @@ fn findings(found: &Findings) -> String {
         out += &tables::capacity(file);
         out += &format!(
             "<div class=\"figures\">{}</div>\n",
-            figure(&plot::capacity(file), "page")
+            figure(&plot::capacity(file, &Style::default()), "page")
         );
     }
     out

@@ -7,7 +7,7 @@ use crate::base::threads::in_pool;
 use crate::draw::error::PictureError;
 use crate::draw::html::{corners, escape, materials, named, pack};
 use crate::draw::plot;
-use crate::draw::plot::{COLUMN, Figure};
+use crate::draw::plot::{COLUMN, Figure, Style};
 use crate::draw::report::decisions;
 use crate::draw::report::{figure, tables};
 use crate::search::held_out_run::control_steps;
@@ -56,9 +56,12 @@ pub(super) fn section(
     if count(team) > 0 {
         out += &watched(team, runs, simulated)?;
     }
-    let figures = [plot::confusion(file), plot::poster(file)]
-        .into_iter()
-        .flatten();
+    let figures = [
+        plot::confusion(file, &Style::default()),
+        plot::poster(file, &Style::default()),
+    ]
+    .into_iter()
+    .flatten();
     let class = |figure: &Figure| {
         if figure.size()[0] > COLUMN + 1.0 {
             "page"
