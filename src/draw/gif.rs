@@ -14,21 +14,22 @@ use ::gif::{DisposalMethod, Encoder, Frame, Repeat};
 use rayon::prelude::*;
 use std::path::Path;
 
+/// The size and speed of an animation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct GifOptions {
+pub struct GifOptions {
     /// Width in pixels ([`stage::WIDTHS`](crate::draw::stage::WIDTHS)) of the picture, or of each
     /// side by side; the body gives the height.
-    pub(crate) width: u32,
+    pub width: u32,
     /// Frames per second, at most 50 (GIFs count hundredths of a second; viewers slow faster ones).
-    pub(crate) fps: f64,
+    pub fps: f64,
     /// The control steps from one frame to the next, at least 1. A second of the robot's time has
     /// 50 control steps, so 1 at 50 frames per second is real time.
-    pub(crate) every: usize,
+    pub every: usize,
     pub(crate) look: Look,
     /// The seconds for which the last frame of each phase stays.
     pub(crate) hold: f64,
     /// True if all rollouts are shown at once.
-    pub(crate) side_by_side: bool,
+    pub side_by_side: bool,
 }
 
 impl Default for GifOptions {
@@ -60,7 +61,11 @@ pub(crate) fn write(
     write_whole(path, &encode(recording, options)?)
 }
 
-pub(crate) fn encode(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, PictureError> {
+/// Encodes a recording as an animated GIF that loops for ever.
+///
+/// # Errors
+/// Returns a [`PictureError`] if the recording cannot be drawn with these options.
+pub fn encode(recording: &Recording, options: &GifOptions) -> Result<Vec<u8>, PictureError> {
     in_pool(|| encoded(recording, options))?
 }
 

@@ -63,7 +63,7 @@ pub struct Recording {
     /// Control steps per actuation cycle (50).
     pub(crate) cycle: usize,
     /// True if the rollout ended early as unstable.
-    pub(crate) unstable: bool,
+    pub unstable: bool,
     /// Meaning of the robot's walks; none for a robot without a task.
     pub(crate) judge: Option<Readout>,
     /// Names of the classes.

@@ -95,28 +95,12 @@ impl<'a> Rollout<'a> {
     }
 
     pub(crate) fn frame(&self) -> Frame {
-        let physics = self.physics();
-        let ground = f64::from(physics.ground_row) * physics.cell_size;
-        let place = |[x, y]: [f64; 2]| {
-            [
-                voxel_lengths(x, physics),
-                voxel_lengths(y - ground, physics),
-            ]
-        };
-        Frame {
-            points: self.world.points().map(place).collect(),
-            centre: place(self.world.centre_of_mass()),
-        }
+        frame(&self.world)
     }
 
     /// Returns the voxels with their corners, as indices into a [`Rollout::frame`]'s points.
     pub(crate) fn voxels(&self) -> Vec<VoxelCorners> {
-        let corner = |((row, column), corners)| VoxelCorners {
-            row,
-            column,
-            corners,
-        };
-        self.world.voxels().map(corner).collect()
+        voxels(&self.world)
     }
 
     pub(crate) fn reset(&mut self) {
@@ -272,6 +256,56 @@ pub fn record(
         }
     }
     recording
+}
+
+/// Records the present moment of a simulation under a stimulus, for a picture.
+pub fn moment(world: &World, body: &Body, stimulus: Grid<f64>) -> Recording {
+    let physics = world.system().physics();
+    let seen = LabelledStimulus {
+        class: 0,
+        label: format!("control step {}", world.control_step()),
+        stimulus,
+    };
+    Recording {
+        robot: String::new(),
+        body: body.clone(),
+        voxels: voxels(world),
+        phases: vec![Phase {
+            first_frame: 0,
+            seen,
+            displacement: 0.0,
+        }],
+        frames: vec![frame(world)],
+        cycle: physics.cycle_steps as usize,
+        unstable: false,
+        judge: None,
+        names: ClassNames::default(),
+    }
+}
+
+fn frame(world: &World) -> Frame {
+    let physics = world.system().physics();
+    let ground = f64::from(physics.ground_row) * physics.cell_size;
+    let place = |[x, y]: [f64; 2]| {
+        [
+            voxel_lengths(x, physics),
+            voxel_lengths(y - ground, physics),
+        ]
+    };
+    Frame {
+        points: world.points().map(place).collect(),
+        centre: place(world.centre_of_mass()),
+    }
+}
+
+/// Returns the voxels with their corners, as indices into a [`frame`]'s points.
+fn voxels(world: &World) -> Vec<VoxelCorners> {
+    let corner = |((row, column), corners)| VoxelCorners {
+        row,
+        column,
+        corners,
+    };
+    world.voxels().map(corner).collect()
 }
 
 #[cfg(test)]

@@ -88,7 +88,7 @@ mod world;
 mod worlds;
 
 pub use body::{Body, Material};
-pub use energy::Energy;
+pub use energy::{Energy, EnergyGauge, EnergyNow};
 pub use grid::Grid;
 pub use physics::{Physics, PhysicsError};
 pub use simd::{FloatEnvironment, InstructionSet};
