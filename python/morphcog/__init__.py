@@ -494,6 +494,12 @@ class Robot:
         """Its genome."""
         return Genome._of(self.run._data.genome(self.id), self.run.config)
 
+    @property
+    def answers(self):
+        """The classes that it answers by walking each way: {"left": [0], "right": [1]}; None for a gait."""
+        answers = self.run._data.answers(self.id)
+        return None if answers is None else dict(zip(["left", "right"], map(list, answers)))
+
     def recording(self):
         """The robot as it walks under its training images: a Recording."""
         return Recording(self.run._data.recorded(self.id), repr(self))

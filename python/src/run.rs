@@ -24,7 +24,7 @@ use morphcog::store::folder;
 use morphcog::store::images::HeldOut;
 use morphcog::store::names::{AUDIT_JSON, RESPONSE_JSON};
 use morphcog::store::run::{Robot, RunFile};
-use morphcog::task::answer;
+use morphcog::task::answer::{self, Readout};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
@@ -135,6 +135,14 @@ impl RunData {
                 "robot {id}: its genome was not published with its body"
             ))),
         }
+    }
+
+    /// Returns the classes that a robot, by its whole id, answers by walking left and right, if it has
+    /// a task.
+    fn answers(&self, id: &str) -> Option<(Vec<u8>, Vec<u8>)> {
+        let known = self.run.elites.iter().find(|elite| elite.id == id);
+        let Readout { left, right } = self.run.judge(known?)?;
+        Some((left, right))
     }
 
     /// Records a robot under its training images.
