@@ -56,6 +56,7 @@ __all__ = [
     "import_dataset",
     "load_run",
     "load_runs",
+    "numbers",
     "rollouts",
     "show",
     "stimuli",
@@ -92,6 +93,10 @@ class Config:
     def to_json(self):
         """The config as JSON."""
         return self._data.to_json()
+
+    def to_dict(self):
+        """The config as dicts, lists, numbers and texts."""
+        return _json.loads(self.to_json())
 
     def __eq__(self, other):
         return self.to_toml() == other.to_toml() if isinstance(other, Config) else NotImplemented
@@ -704,6 +709,11 @@ def evolve(
             config, _path(out), resume, force, _path(data), threads, progress, progress.waits
         )
     return Run(folder)
+
+
+def numbers(event):
+    """What of a callback's event is a number, for a tracker of experiments."""
+    return {key: value for key, value in event.items() if type(value) in (int, float)}
 
 
 def _archives(runs):

@@ -18,17 +18,17 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 
 import morphcog
 
-# How a body is trained unless settings says otherwise: fewer rollouts than `morphcog train` has by default.
+# How a body is trained unless settings says otherwise.
 _SETTINGS = {
     "stimulus.reduction": "area",
     "stimulus.encoding": "intensity",
     "stimulus.margin": 0,
     "train.windows": 0,
-    "train.rounds": 3,
-    "train.images": 100,
-    "train.final_images": 200,
     "validation.best": 0,
 }
+
+# With a time budget, a first body is trained quickly; challengers get the rest.
+_QUICK = {"train.rounds": 2, "train.images": 60, "train.final_images": 100}
 
 # Challengers between two looks at the clock.
 _AT_ONCE = 4
@@ -141,10 +141,12 @@ class BodyClassifier(ClassifierMixin, BaseEstimator):
         data = pathlib.Path(f"{folder}-data")
         _write_idx(data, images[both], classes)
 
+        settings = {**_SETTINGS, **({} if until is None else _QUICK), **(self.settings or {})}
+
         def run(challengers, resume, callback=None):
             return morphcog.train(
                 gaits, "0|1", robots=self.robots, seed=seed, dataset="rows", data=data, out=folder,
-                set={**_SETTINGS, **(self.settings or {}), "train.challengers": challengers}, resume=resume,
+                set={**settings, "train.challengers": challengers}, resume=resume,
                 audit=False, threads=self.threads, quiet=not self.verbose, callback=callback,
             )
 
