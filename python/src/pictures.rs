@@ -90,7 +90,7 @@ impl RecordingData {
             .map(image)
             .collect::<PyResult<Vec<_>>>()?;
         let recording = watched(py, |_| {
-            record("body", &body, &physics, &protocol, true, &images)
+            record("", &body, &physics, &protocol, true, &images)
         })?;
         Ok(RecordingData::new(recording))
     }

@@ -60,6 +60,8 @@ pub struct Recording {
     pub phases: Vec<Phase>,
     /// All frames.
     pub frames: Vec<Frame>,
+    /// Control steps from one frame to the next: 1, except for a single moment.
+    pub(crate) every: usize,
     /// Control steps per actuation cycle (50).
     pub(crate) cycle: usize,
     /// True if the rollout ended early as unstable.

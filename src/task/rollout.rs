@@ -223,6 +223,7 @@ pub fn record(
         voxels: rollout.voxels(),
         phases: Vec::new(),
         frames: Vec::new(),
+        every: 1,
         cycle: physics.cycle_steps as usize,
         unstable: false,
         judge: None,
@@ -258,12 +259,14 @@ pub fn record(
     recording
 }
 
-/// Records the present moment of a simulation under a stimulus, for a picture.
+/// Records the start of a simulation and its present moment under a stimulus, for a picture.
 pub fn moment(world: &World, body: &Body, stimulus: Grid<f64>) -> Recording {
-    let physics = world.system().physics();
+    let mut start = world.clone();
+    start.reset();
+    let frames = vec![frame(&start), frame(world)];
     let seen = LabelledStimulus {
         class: 0,
-        label: format!("control step {}", world.control_step()),
+        label: "now".to_string(),
         stimulus,
     };
     Recording {
@@ -273,10 +276,11 @@ pub fn moment(world: &World, body: &Body, stimulus: Grid<f64>) -> Recording {
         phases: vec![Phase {
             first_frame: 0,
             seen,
-            displacement: 0.0,
+            displacement: frames[1].centre[0] - frames[0].centre[0],
         }],
-        frames: vec![frame(world)],
-        cycle: physics.cycle_steps as usize,
+        frames,
+        every: world.control_step() as usize,
+        cycle: world.system().physics().cycle_steps as usize,
         unstable: false,
         judge: None,
         names: ClassNames::default(),

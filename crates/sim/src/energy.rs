@@ -201,10 +201,8 @@ impl Meter {
             (state.position[axis][point] - state.previous[axis][point]) / system.physics.time_step
         };
         let squares = self.points.iter().map(|&point| {
-            [X, Y]
-                .map(|axis| speed(point, axis).powi(2))
-                .iter()
-                .sum::<f64>()
+            let [x, y] = [X, Y].map(|axis| speed(point, axis));
+            x * x + y * y
         });
         self.half_mass * squares.sum::<f64>()
     }
