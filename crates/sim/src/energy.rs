@@ -8,9 +8,8 @@
 //! part of the change is 0 up to rounding.
 
 use crate::lattice::{FAMILIES, spring_index};
-use crate::state::{Pair, X, Y};
+use crate::state::{Pair, State, X, Y};
 use crate::system::System;
-use crate::world::World;
 
 /// Energies put into a robot \[mass·wu²/s²\].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -25,70 +24,6 @@ pub struct Energy {
     pub drive: f64,
     /// The length limits' share: they move the points while the goals stay.
     pub limits: f64,
-}
-
-/// Energies of a robot at one moment \[mass·wu²/s²\].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct EnergyNow {
-    /// The motion of all points over the last substep.
-    pub kinetic: f64,
-    /// The springs, relative to their goals of the last control step.
-    pub elastic: f64,
-    /// The height of all points above the floor plane.
-    pub gravitational: f64,
-    /// The energy that the actuators have put in since the start, as [`Energy::drive`].
-    pub drive: f64,
-}
-
-/// Measures the energies of a simulation between control steps: cheaper than
-/// [`World::with_energy_meter`], which looks at every substep, and for simulations side by side, too.
-#[derive(Clone, Debug)]
-pub struct EnergyGauge {
-    meter: Meter,
-    /// Positions after the control step observed last.
-    position: Pair,
-    now: EnergyNow,
-}
-
-impl EnergyGauge {
-    /// Begins with a simulation that has not stepped yet.
-    pub fn new(world: &World) -> Self {
-        let meter = Meter::new(&world.system);
-        let position = world.state.position.clone();
-        let now = EnergyNow {
-            elastic: meter.elastic(&position),
-            gravitational: meter.gravitational(&position),
-            ..EnergyNow::default()
-        };
-        EnergyGauge {
-            meter,
-            position,
-            now,
-        }
-    }
-
-    /// Observes a control step that was just completed; each must be observed once.
-    pub fn observe(&mut self, world: &World) -> EnergyNow {
-        let EnergyGauge {
-            meter,
-            position,
-            now,
-        } = self;
-        meter.goals.clear();
-        meter.goals.extend_from_slice(&world.scratch.goals);
-        // The goals of a step are set at its start, when the points are where the last one left them.
-        now.drive += meter.elastic(position) - now.elastic;
-        position.clone_from(&world.state.position);
-        now.elastic = meter.elastic(position);
-        now.gravitational = meter.gravitational(position);
-        now.kinetic = meter.kinetic(world);
-        *now
-    }
-
-    /// Returns the energies observed last.
-    pub fn now(&self) -> EnergyNow {
-        self.now
-    }
 }
 
 /// The data of a spring that its energy depends on.
@@ -171,9 +106,14 @@ impl Meter {
     /// Records new goals at the start of a control step.
     pub fn drive(&mut self, goals: &[f64], position: &Pair) {
         let before = self.potential(position);
+        self.set_goals(goals);
+        self.energy.drive += self.potential(position) - before;
+    }
+
+    /// Records the goals of the control step just completed.
+    pub fn set_goals(&mut self, goals: &[f64]) {
         self.goals.clear();
         self.goals.extend_from_slice(goals);
-        self.energy.drive += self.potential(position) - before;
     }
 
     /// Measures before the limits are applied.
@@ -190,15 +130,15 @@ impl Meter {
         self.elastic(position) + self.gravitational(position)
     }
 
-    fn gravitational(&self, position: &Pair) -> f64 {
+    pub fn gravitational(&self, position: &Pair) -> f64 {
         let height: f64 = self.points.iter().map(|&point| position[Y][point]).sum();
         self.weight * height
     }
 
     /// Returns the energy of the points' motion over the last substep.
-    fn kinetic(&self, World { system, state, .. }: &World) -> f64 {
+    pub fn kinetic(&self, state: &State, time_step: f64) -> f64 {
         let speed = |point: usize, axis: usize| {
-            (state.position[axis][point] - state.previous[axis][point]) / system.physics.time_step
+            (state.position[axis][point] - state.previous[axis][point]) / time_step
         };
         let squares = self.points.iter().map(|&point| {
             let [x, y] = [X, Y].map(|axis| speed(point, axis));
@@ -207,7 +147,7 @@ impl Meter {
         self.half_mass * squares.sum::<f64>()
     }
 
-    fn elastic(&self, position: &Pair) -> f64 {
+    pub fn elastic(&self, position: &Pair) -> f64 {
         let [x, y] = [&position[X], &position[Y]];
         let elastic = |spring: &Spring| {
             let [a, b] = spring.ends;
@@ -268,30 +208,6 @@ mod tests {
             (drive - expected).abs() < 1e-6 * expected,
             "{drive}, expected {expected}"
         );
-    }
-
-    #[test]
-    fn a_gauge_finds_the_drive_of_the_meter_and_what_falls_keeps_its_energy() {
-        let observed = |body: &str| {
-            let system = System::new(&body.parse().unwrap(), Physics::default());
-            let mut world = World::new(system, Start { column: 0, row: 20 }).with_energy_meter();
-            let mut gauge = EnergyGauge::new(&world);
-            let begin = gauge.now();
-            for _ in 0..40 {
-                world.step().unwrap();
-                gauge.observe(&world);
-            }
-            (world.energy(), begin, gauge.now())
-        };
-        let (metered, _, driven) = observed("344/044");
-        let wrong = (driven.drive - metered.drive).abs();
-        assert!(wrong < 1e-9 * metered.drive, "{driven:?}, {metered:?}");
-        assert!(driven.kinetic > 0.0 && driven.elastic > 0.0);
-        let (_, begin, end) = observed("111/202");
-        let total = |at: EnergyNow| at.kinetic + at.elastic + at.gravitational;
-        assert!(end.kinetic > 1.0 && end.drive == 0.0);
-        let lost = (total(end) - total(begin)).abs();
-        assert!(lost < 0.01 * end.kinetic, "{begin:?} {end:?}");
     }
 
     #[test]

@@ -73,6 +73,7 @@
 
 pub mod body;
 mod energy;
+mod gauge;
 pub mod grid;
 mod lattice;
 mod physics;
@@ -88,7 +89,8 @@ mod world;
 mod worlds;
 
 pub use body::{Body, Material};
-pub use energy::{Energy, EnergyGauge, EnergyNow};
+pub use energy::Energy;
+pub use gauge::{EnergyGauge, EnergyNow};
 pub use grid::Grid;
 pub use physics::{Physics, PhysicsError};
 pub use simd::{FloatEnvironment, InstructionSet};
