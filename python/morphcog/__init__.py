@@ -12,35 +12,41 @@ of an actuation cycle.
 >>> robot = run["best"]                 # shows itself in a notebook
 >>> x = mc.stimuli(pixels, run.config)  # uint8 (images, 28, 28) -> float64 (images, rows, columns)
 >>> mc.displacements([robot.body], x)   # float64 (bodies, images)
+>>> mc.rollouts([robot.body], x).path   # also energies, ground contacts and shapes, over time
+>>> child = robot.genome.mutate(seed=1) # what evolves; child.body() is its body
 """
 
 from __future__ import annotations
 
-import base64 as _base64
+import dataclasses as _dataclasses
 import html as _html
 import io as _io
 import json as _json
-import operator as _operator
 import os as _os
 import pathlib as _pathlib
-import sys as _sys
 import threading as _threading
-import time as _time
-import warnings as _warnings
-from collections.abc import Mapping as _Mapping
-from dataclasses import dataclass as _dataclass
 
 import numpy as _np
 
 from . import _morphcog
-from ._morphcog import Error, Unstable, __version__
+from ._morphcog import Error, Stopped, Unstable, __version__
+from ._pictures import Figure, Recording
+from ._progress import Progress as _Progress
+from ._progress import main_is_interrupted as _main_is_interrupted
+from ._values import _array, _body, _changes, _images, _path, _stimuli, _threads, _whole
 
 __all__ = [
     "Config",
     "Error",
+    "Figure",
+    "Genome",
     "Imported",
+    "Recording",
     "Robot",
+    "Rollouts",
     "Run",
+    "Stopped",
+    "Team",
     "Unstable",
     "World",
     "displacements",
@@ -49,101 +55,16 @@ __all__ = [
     "images",
     "import_dataset",
     "load_run",
+    "load_runs",
+    "numbers",
+    "rollouts",
+    "show",
     "stimuli",
+    "team",
+    "train",
 ]
 
-
-def _given(value, what, expected):
-    try:
-        return _np.asarray(value)
-    except ValueError:
-        raise Error(f"{what}: expected {expected}, found rows of different lengths") from None
-
-
-def _array(value, dtype, dimensions, what, expected):
-    """An array of a type and a number of dimensions; nothing is rounded or cut off on the way."""
-    given = _given(value, what, expected)
-    if given.ndim != dimensions:
-        raise Error(f"{what}: expected {expected}, found shape {given.shape}")
-    kinds = {"u": "iu", "f": "biuf"}[_np.dtype(dtype).kind]
-    if given.dtype.kind not in kinds:
-        raise Error(f"{what}: expected {expected}, found type {given.dtype}")
-    converted = given.astype(dtype, copy=False)
-    if _np.dtype(dtype).kind == "u" and not _np.array_equal(converted, given):
-        raise Error(f"{what}: expected {expected}, found numbers from {given.min()} to {given.max()}")
-    return _np.ascontiguousarray(converted)
-
-
-def _whole(value, what, least, most=2**63 - 1):
-    """A whole number within bounds, or none."""
-    if value is None:
-        return None
-    try:
-        number = _operator.index(value)
-    except TypeError:
-        number = None
-    if number is None or not least <= number <= most:
-        raise Error(f"{what}={value!r}: expected a whole number from {least} to {most}")
-    return number
-
-
-def _threads(value):
-    return _whole(value, "threads", 1, _morphcog.MOST_THREADS)
-
-
-def _body(value, what="body"):
-    return _array(value, _np.uint8, 2, what, "materials 0 to 6 of shape (rows, columns)")
-
-
-def _stimuli(value):
-    return _array(value, _np.float64, 3, "stimuli", "pixels from 0 to 1 of shape (images, rows, columns)")
-
-
-def _images(value):
-    """Images as bytes: bool is black and white; fractions are refused, since 1.0 may be full or 1 of 255."""
-    expected = "whole numbers from 0 to 255, or bool, of shape (images, rows, columns)"
-    given = _given(value, "images", expected)
-    if given.dtype.kind == "b":
-        given = _np.multiply(given, 255, dtype=_np.uint8)
-    elif given.dtype.kind == "f":
-        remedy = "if 1 is full, (255 * images).astype('uint8')"
-        raise Error(f"images: expected {expected}, found type {given.dtype}; {remedy}")
-    images = _array(given, _np.uint8, 3, "images", expected)
-    if images.size and images.max() == 1:
-        _warnings.warn("images: the largest pixel is 1 of 255, nearly black; pass bool if 1 is full", stacklevel=3)
-    return images
-
-
-def _path(value):
-    """A path as text, from text or any path-like object; ~ is the home folder. None stays."""
-    return None if value is None else _os.path.expanduser(_os.fsdecode(value))
-
-
-def _value(value):
-    """A value of a config's key as TOML; None is its default."""
-    if value is None:
-        return ""
-    if isinstance(value, str):
-        return value
-    if isinstance(value, _os.PathLike):
-        return _json.dumps(_path(value), ensure_ascii=False)
-    return _json.dumps(value, default=lambda other: _np.asarray(other).tolist())
-
-
-def _changes(set, before=""):
-    """Changes of keys, as key=value: from one text, several, or a dict, also of dicts."""
-    if isinstance(set, str):
-        return [set]
-    if not isinstance(set, _Mapping):
-        changes = list(set)
-        if not all(isinstance(change, str) for change in changes):
-            raise Error('set: expected a dict, or changes of keys as "map_elites.parents=10"')
-        return changes
-    changes = []
-    for key, value in set.items():
-        inner = isinstance(value, _Mapping)
-        changes += _changes(value, f"{before}{key}.") if inner else [f"{before}{key}={_value(value)}"]
-    return changes
+_dataclass = _dataclasses.dataclass
 
 
 class Config:
@@ -173,6 +94,10 @@ class Config:
         """The config as JSON."""
         return self._data.to_json()
 
+    def to_dict(self):
+        """The config as dicts, lists, numbers and texts."""
+        return _json.loads(self.to_json())
+
     def __eq__(self, other):
         return self.to_toml() == other.to_toml() if isinstance(other, Config) else NotImplemented
 
@@ -195,65 +120,6 @@ def _config(config):
     if config is None:
         return None
     return (config if isinstance(config, Config) else Config(config))._data
-
-
-class _Progress:
-    """Says on stderr how far a command is: in a terminal and in a notebook in one line that changes, elsewhere in
-    lines from time to time; warnings are Python's."""
-
-    def __init__(self, quiet):
-        self._stream = None if quiet else _sys.stderr
-        moves = getattr(self._stream, "isatty", bool)() or type(self._stream).__module__.startswith("ipykernel")
-        self._moves, self._least = moves, 0.5 if moves else 10.0
-        self._begun = self._said = _time.monotonic()
-        self._text, self._shown = "", ""
-
-    def __call__(self, kind, text):
-        if kind == "warning":
-            _warnings.warn(text, stacklevel=3)
-        elif kind == "note":
-            self._write(f"{self._over(text)}\n")
-            self._shown = ""
-        else:
-            self._text = text
-            # The longer it takes, the less often: a log of hours stays short.
-            now = _time.monotonic()
-            if now - self._said >= max(self._least, (now - self._begun) / 200):
-                self._said = now
-                self._show()
-
-    def _over(self, text):
-        """A text in the place of the line that is shown."""
-        return f"\r{text:<{len(self._shown)}}" if self._moves and self._shown else text
-
-    def _show(self):
-        end = "" if self._moves else "\n"
-        self._write(self._over(self._text) + end)
-        self._shown = self._text
-
-    def _write(self, text):
-        if self._stream is not None:
-            self._stream.write(text)
-            self._stream.flush()
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        if self._text != self._shown:
-            self._show()
-        if self._moves and self._text:
-            self._write("\n")
-
-
-def _main_is_interrupted():
-    """True in another thread than the main one while Ctrl-C ends that, which would wait for this one."""
-    main = _threading.main_thread()
-    if _threading.current_thread() is main:
-        return False
-    handled = getattr(_sys, "_current_exceptions", dict)().get(main.ident)
-    found = handled[1] if isinstance(handled, tuple) else handled
-    return isinstance(found if main.is_alive() else getattr(_sys, "last_value", None), KeyboardInterrupt)
 
 
 def images(dataset="builtin", split="train", data=None):
@@ -378,6 +244,151 @@ def displacements(bodies, stimuli, *, control_steps=None, config=None, threads=N
     return _morphcog.displacements(bodies, _stimuli(stimuli), steps, _config(config), _threads(threads))
 
 
+@_dataclass(frozen=True, repr=False)
+class Rollouts:
+    """What bodies do under images: arrays of (bodies, images), or of (bodies, images, moments) with a moment for
+    each of steps. Lengths are voxel lengths, energies mass·wu²/s² (a wu is ten voxel lengths); nan from where a
+    simulation became unstable."""
+
+    displacement: _np.ndarray
+    """(bodies, images): how far the centre of mass moved, right positive; as morphcog.displacements."""
+    steps: _np.ndarray
+    """(moments,): the control steps done at each moment, 0 first."""
+    path: _np.ndarray
+    """(bodies, images, moments, 2): the centre of mass, x from the start's left edge, y from the ground."""
+    width: _np.ndarray
+    """The width of the body."""
+    height: _np.ndarray
+    """The height of the body, from its lowest point."""
+    ground: _np.ndarray
+    """The share of the body's points that touch the ground."""
+    kinetic: _np.ndarray
+    """The energy of the points' motion."""
+    elastic: _np.ndarray
+    """The energy of the springs, relative to what muscles and sensors pull them to."""
+    gravitational: _np.ndarray
+    """The energy of the points' height."""
+    drive: _np.ndarray
+    """The energy that muscles and sensors have put in so far."""
+
+    def __repr__(self):
+        bodies, images = self.displacement.shape
+        return f"Rollouts({bodies} bodies, {images} images, {len(self.steps)} moments to control step {self.steps[-1]})"
+
+
+def rollouts(bodies, stimuli, *, control_steps=None, every=1, config=None, threads=None):
+    """What each body does under each image, in a fresh simulation each: Rollouts, for fitnesses and descriptors
+    of your own.
+
+    every: control steps from one moment to the next; a cycle has 50. All else is as of morphcog.displacements,
+    whose numbers are the same to the bit.
+    """
+    bodies = [_body(body, f"body {number}") for number, body in enumerate(bodies)]
+    steps = _whole(control_steps, "control_steps", 1, _morphcog.MAX_STEPS)
+    every = _whole(every, "every", 1, _morphcog.MAX_STEPS)
+    walked, moments = _morphcog.rollouts(bodies, _stimuli(stimuli), steps, every, _config(config), _threads(threads))
+    width, height, ground, kinetic, elastic, gravitational, drive = (moments[..., k] for k in range(2, 9))
+    steps = every * _np.arange(moments.shape[2])
+    return Rollouts(
+        walked, steps, moments[..., :2], width, height, ground, kinetic, elastic, gravitational, drive
+    )
+
+
+def show(body, stimuli=None, *, control_steps=None, config=None):
+    """A body that walks under one image or several, in a fresh simulation each: a Recording, which a notebook
+    shows and which save writes.
+
+    body: an array of materials, a Robot or a Genome. stimuli: (rows, columns) or (images, rows, columns), at
+    most 20 images; default: dark, or of a Robot its training images. control_steps: how long each is shown
+    (default: as the config says, 500). config: whose physics are used (default: the paper's, or the robot's).
+    """
+    config = getattr(getattr(body, "run", body), "config", None) if config is None else config
+    if isinstance(body, Robot) and stimuli is None:
+        return body.recording()
+    name = repr(body) if isinstance(body, (Robot, Genome)) else ""
+    body = body.body if isinstance(body, Robot) else body.body() if isinstance(body, Genome) else _body(body)
+    stimuli = _np.zeros(body.shape) if stimuli is None else _np.asarray(stimuli)
+    stimuli = _stimuli(stimuli[None] if stimuli.ndim == 2 else stimuli)
+    if not 1 <= len(stimuli) <= 20:
+        raise Error(f"stimuli: expected 1 to 20 images, found {len(stimuli)}")
+    steps = _whole(control_steps, "control_steps", 1, _morphcog.MAX_STEPS)
+    data = _morphcog.RecordingData(body, stimuli, steps, _config(config))
+    walked = ", ".join(f"{walk:+.2f}" for walk in data.displacements)
+    end = "; then unstable" if data.unstable else ""
+    return Recording(data, f"Recording({name or f'body={body.shape[0]}×{body.shape[1]}'}, walked {walked}{end})")
+
+
+class Genome:
+    """What evolves: a network that describes a body, and voxels that differ from it. Its body is connected and
+    has as many muscles as the config asks for. Genomes are equal if they describe bodies in the same way.
+
+    The random streams are those of evolution: random(config, seed, child=k) is the individual that a run of the
+    config with that seed begins with as its k-th.
+    """
+
+    @classmethod
+    def _of(cls, data, config):
+        genome = cls.__new__(cls)
+        genome._data, genome.config = data, config
+        return genome
+
+    def __init__(self):
+        raise TypeError("make a Genome by Genome.random(config, seed), Genome.from_json(text, config) or robot.genome")
+
+    @classmethod
+    def random(cls, config, seed, *, generation=0, child=0):
+        """A random genome. config: whose sections [body] and [genome] say what is possible."""
+        config = config if isinstance(config, Config) else Config(config)
+        return cls._of(_morphcog.GenomeData.random(config._data, *_stream(seed, generation, child)), config)
+
+    def mutate(self, seed, *, generation=1, child=0):
+        """A mutated copy whose body is valid."""
+        data = self._data.mutate(self.config._data, *_stream(seed, generation, child))
+        return Genome._of(data, self.config)
+
+    def body(self):
+        """The body: uint8 (rows, columns)."""
+        return self._data.body()
+
+    @property
+    def id(self):
+        """Ten letters and digits that are the same for equal genomes; the id of a robot that has it."""
+        return self._data.id
+
+    def to_json(self):
+        """The genome as JSON, as in run.json."""
+        return self._data.to_json()
+
+    @classmethod
+    def from_json(cls, text, config):
+        """A genome from the JSON of to_json, or of a robot in run.json."""
+        config = config if isinstance(config, Config) else Config(config)
+        return cls._of(_morphcog.GenomeData.parsed(str(text), config._data), config)
+
+    def _repr_html_(self):
+        return show(self)._repr_html_()
+
+    def __eq__(self, other):
+        return self.to_json() == other.to_json() if isinstance(other, Genome) else NotImplemented
+
+    def __hash__(self):
+        return hash(self.to_json())
+
+    def __reduce__(self):
+        return Genome.from_json, (self.to_json(), self.config)
+
+    def __repr__(self):
+        body = self.body()
+        muscles, sensors = _np.isin(body, [3, 4]).sum(), _np.isin(body, [5, 6]).sum()
+        size = f"{body.shape[0]}×{body.shape[1]}"
+        return f"Genome({self.id}, body={size}, voxels={(body > 0).sum()}, muscles={muscles}, sensors={sensors})"
+
+
+def _stream(seed, generation, child):
+    most = 2**63 - 1
+    return _whole(seed, "seed", 0, most), _whole(generation, "generation", 0, most), _whole(child, "child", 0, most)
+
+
 class World:
     """One simulation of a body on flat ground, step by step; threads that share it take turns. A copy
     (copy.copy) goes on by itself from the same state.
@@ -446,6 +457,11 @@ class World:
         with self._turn:
             return _np.array(self._world.centre)
 
+    def render(self):
+        """A picture of the present moment: a Recording of it alone, which a notebook shows and save writes."""
+        with self._turn:
+            return Recording(self._world.recorded(self._stimulus), repr(self), is_still=True)
+
     def __copy__(self):
         other = World.__new__(World)
         with self._turn:
@@ -478,33 +494,50 @@ class Robot:
         """As morphcog.displacements for this robot, with its run's config: float64 (images,)."""
         return displacements([self.body], stimuli, **{"config": self.run.config, **options})[0]
 
+    @property
+    def genome(self):
+        """Its genome."""
+        return Genome._of(self.run._data.genome(self.id), self.run.config)
+
+    @property
+    def answers(self):
+        """The classes that it answers by walking each way: {"left": [0], "right": [1]}; None for a gait."""
+        answers = self.run._data.answers(self.id)
+        return None if answers is None else dict(zip(["left", "right"], map(list, answers)))
+
+    def recording(self):
+        """The robot as it walks under its training images: a Recording."""
+        return Recording(self.run._data.recorded(self.id), repr(self))
+
     def page(self):
         """A page for a browser in which it walks under its training images, as HTML."""
-        return self.run._data.page(self.id)
+        return self.recording()._data.page()
+
+    def gif(self, path, *, width=480, every=1, side_by_side=False):
+        """Writes an animation of it under its training images, and returns the path; as Recording.save."""
+        path = _path(path)
+        if not path.lower().endswith(".gif"):
+            raise Error(f"path={path}: expected a name that ends in .gif")
+        return self.recording().save(path, width=width, every=every, side_by_side=side_by_side)
+
+    def plot(self, kind="body", **options):
+        """A figure of it: "body", "spacetime" or "snapshots"; as Run.plot."""
+        return self.run.plot(kind, self.id, **options)
 
     def _repr_html_(self):
         try:
-            page, still = self.run._data.small_page(self.id)
+            return self.recording()._repr_html_()
         except Error as error:
             return f"<pre>{_html.escape(f'{self!r}: {error}')}</pre>"
-        return _framed(page, still, repr(self))
 
     def __repr__(self):
         rows, columns = self.body.shape
         return f"Robot({self.id}, task={self.task}, objective={self.objective:.3f}, body={rows}×{columns})"
 
 
-def _framed(page, still, title):
-    """A page over a picture, which is left where a viewer takes away the page and its scripts."""
-    title, page = _html.escape(title), _html.escape(page)
-    picture = f'<img src="data:image/gif;base64,{_base64.b64encode(still).decode()}" alt="{title}">'
-    place = "position:absolute;top:0;left:0;width:100%;height:100%;border:0"
-    frame = f'<iframe srcdoc="{page}" style="{place}" title="{title}"></iframe>'
-    return f'<div style="position:relative;height:560px">{picture}{frame}</div>'
-
-
 class Run:
-    """A run folder: an archive of robots with its config. A pickled one is its path, and is read again."""
+    """A run folder: an archive of robots with its config. Iteration gives its robots, len their number. A pickled
+    one is its path, and is read again."""
 
     def __init__(self, folder):
         self._data = _morphcog.RunData(_path(folder))
@@ -537,6 +570,48 @@ class Run:
         identity, task, objective, body = self._data.robot(robot)
         return Robot(identity, task, objective, body, self)
 
+    def __iter__(self):
+        for identity, task, objective, body in self._data.robots():
+            yield Robot(identity, task, objective, body, self)
+
+    def __len__(self):
+        return len(self._data.robots())
+
+    @property
+    def metrics(self):
+        """How it went, a row for each generation, as a pandas DataFrame: qd_score, coverage, obj_max, evaluations, …"""
+        path = self.path.with_name("metrics.csv")
+        if not path.is_file():
+            raise Error(f"{path}: there are no metrics of this run; runs that ship with morphcog have none")
+        return _table_in(path)
+
+    def plot(self, kind="archive", robot=None, *, every=None, transparent=False, data=None):
+        """A Figure, as `morphcog plot` makes it.
+
+        kind: of the run, "archive", "progress", "accuracy" (of its evaluation), "capacity" or "gates"; of a robot,
+        "body", "spacetime" or "snapshots". robot: its id, the beginning of that, or "best" (default). every:
+        control steps between the poses of snapshots (default: fits the walk).
+        """
+        every = _whole(every, "every", 1) or 0
+        return Figure(self._data.figure(str(kind), robot, every, bool(transparent), _path(data)))
+
+    def response(
+        self, robots="best", *, task=None, set=(), images=1000, error=0.2, seed=None, data=None, quiet=False
+    ):
+        """How far each soft voxel and sensor moves robots, as `morphcog response`: a DataFrame with a row for each
+        robot and place: slope, its standard error, material.
+
+        task: two groups of classes, as "4|9", to write the accuracy that training could reach to response.json
+        beside the run. images: most rollouts of a robot. error: relative error of the slopes at which it ends.
+        """
+        images, seed = _whole(images, "images", 0), _whole(seed, "seed", 0)
+        with _Progress(quiet) as progress:
+            return _table_in(
+                self._data.response(
+                    str(robots), task, _changes(set), images, float(error), seed, _path(data), progress
+                )
+            )
+
     def evaluate(self, robots="top:10", images=None, split="test", data=None, quiet=False):
         """Tests robots on held-out images, as `morphcog eval`: a DataFrame with a row for each robot.
 
@@ -552,7 +627,10 @@ class Run:
             return _table_in(self._data.audit(str(robots), _path(data), progress))
 
     def __repr__(self):
-        return f"Run({str(self.path)!r}, generations={self.generations})"
+        robots = len(self)
+        best = max((robot[2] for robot in self._data.robots()), default=None)
+        best = "" if best is None else f", best={best:.2f}"
+        return f"Run({str(self.path)!r}, generations={self.generations}, robots={robots}{best})"
 
 
 def _restored_run(path, settings):
@@ -562,12 +640,16 @@ def _restored_run(path, settings):
     return run
 
 
-def _table(file):
+def _pandas():
     try:
         import pandas
     except ImportError:
         raise ImportError("tables need pandas: pip install pandas") from None
-    return pandas.read_csv(file, dtype={"id": str})
+    return pandas
+
+
+def _table(file):
+    return _pandas().read_csv(file, dtype={"id": str})
 
 
 def _table_in(path):
@@ -576,8 +658,20 @@ def _table_in(path):
 
 
 def load_run(folder):
-    """A run by its folder or its run.json; or one that ships with morphcog, as "gallery:zero_one-1"."""
+    """A run by its folder or its run.json; one that ships with morphcog, as "gallery:zero_one-1"; or "gallery:",
+    the five robots that the paper's authors published."""
     return Run(folder)
+
+
+def load_runs(folder):
+    """All runs in a folder, or of a set that ships with morphcog, as "gallery:zero_one" or "gallery:team"."""
+    return [Run(path) for path in _morphcog.runs(_path(folder))]
+
+
+def _either(resume, force):
+    if resume and force:
+        raise Error("resume=True, force=True: expected one of them: resume goes on with a run, force replaces it")
+    return bool(resume), bool(force)
 
 
 def evolve(
@@ -592,6 +686,7 @@ def evolve(
     data=None,
     threads=None,
     quiet=False,
+    callback=None,
 ):
     """Evolves an archive of robots, as `morphcog evolve`, and returns its Run.
 
@@ -599,16 +694,135 @@ def evolve(
     "map_elites.parents=10", several of them, or a dict. out: run folder (default: runs/<config>-seed<seed>).
     resume: goes on with the run in the folder. force: replaces it. quiet: says nothing of how far it is. Ctrl-C
     saves the run, which resume goes on with. Raises Error with what is wrong.
+
+    callback: called after every generation with a dict: generation, generations, best, coverage, qd_score,
+    evaluations; best is None as long as no robot has a fitness. If it returns True or raises StopIteration,
+    evolution stops there and the Run so far is returned; another exception is raised once the run is saved.
     """
-    if resume and force:
-        raise Error("resume=True, force=True: expected one of them: resume goes on with a run, force replaces it")
+    resume, force = _either(resume, force)
     changes = _changes(set)
     changes += [] if seed is None else [f"seed={seed}"]
     changes += [] if generations is None else [f"generations={generations}"]
     config, threads = Config(config, changes)._data, _threads(threads)
-    with _Progress(quiet) as progress:
-        folder = _morphcog.evolve_run(config, _path(out), bool(resume), bool(force), _path(data), threads, progress)
+    with _Progress(quiet, callback) as progress:
+        folder = _morphcog.evolve_run(
+            config, _path(out), resume, force, _path(data), threads, progress, progress.waits
+        )
     return Run(folder)
+
+
+def numbers(event):
+    """What of a callback's event is a number, for a tracker of experiments."""
+    return {key: value for key, value in event.items() if type(value) in (int, float)}
+
+
+def _archives(runs):
+    """The run.json files that runs, folders or names mean."""
+    several = [runs] if isinstance(runs, (str, bytes, _os.PathLike, Run)) else runs
+    return [path for run in several for path in ([run._data.place] if isinstance(run, Run) else _morphcog.runs(_path(run)))]
+
+
+def train(
+    runs,
+    task,
+    *,
+    robots=None,
+    seed=None,
+    set=(),
+    dataset=None,
+    out=None,
+    resume=False,
+    force=False,
+    audit=True,
+    data=None,
+    threads=None,
+    quiet=False,
+    callback=None,
+):
+    """Trains a gait to tell two groups of images apart, as `morphcog train`, and returns the Run of the robot.
+
+    runs: the Run of the gaits, its folder or its name, such as "gallery:gaits-6"; of several, the gait with the
+    highest predicted accuracy is trained. task: two groups of classes, as "4|9" or "cat|dog". robots: whose gaits
+    are tried (default: "top:4", of several runs "top:5"). set: changes of keys, as of evolve. dataset: its name
+    (default: that of the gaits). out: run folder (default: that of the gaits and the task). audit: audits the
+    robot, too.
+
+    callback: called with a dict whenever there is news: event is "window", "round" or "challenge", and the
+    fields are those of `morphcog train --json`. If it returns True or raises StopIteration, training stops and
+    Stopped is raised: resume=True goes on. Another exception is raised once all rollouts are saved.
+    """
+    resume, force = _either(resume, force)
+    changes = ([] if dataset is None else [f"data.dataset={_path(dataset)}"]) + _changes(set)
+    seed, threads = _whole(seed, "seed", 0), _threads(threads)
+    robots = None if robots is None else str(robots)
+    with _Progress(quiet, callback) as progress:
+        folder = _morphcog.train_run(
+            _archives(runs), str(task), robots, seed, changes, _path(out), resume, force, bool(audit), _path(data),
+            threads, progress, progress.waits,
+        )
+    return Run(folder)
+
+
+@_dataclass(frozen=True, repr=False)
+class Team:
+    """Robots that were tested together. accuracy: of the answers by most votes, with its 95 % interval; walks:
+    of those by the largest sum of walks. members: a DataFrame with a row for each robot. confusion and bodies:
+    Figures of the answers and of all bodies. about: all of team.json. path: that file."""
+
+    accuracy: float
+    interval: tuple
+    walks: float
+    members: object
+    confusion: Figure
+    bodies: Figure
+    about: dict
+    path: _pathlib.Path
+
+    def __repr__(self):
+        robots, images = len(self.about["members"]), len(self.about["images"])
+        low, high = self.interval
+        return f"Team({robots} robots, {images} images, accuracy={self.accuracy:.3f} [{low:.3f}, {high:.3f}])"
+
+
+def team(
+    runs="gallery:team",
+    *,
+    robots="best",
+    classes=None,
+    images=None,
+    split="test",
+    seed=1,
+    out=None,
+    data=None,
+    threads=None,
+    quiet=False,
+):
+    """Tests robots that answer together, as `morphcog team`, and returns a Team.
+
+    runs: Runs, folders or names; default: a robot for each pair of digits. classes: names or numbers of those to
+    tell apart (default: all). images: how many, or "all"; None: 1000, or all if there are fewer. out: result file
+    (default: team.json in the folder above all runs). Ctrl-C keeps what is done; the same call goes on.
+    """
+    classes = None if classes is None else [str(name) for name in classes]
+    seed, threads = _whole(seed, "seed", 0), _threads(threads)
+    with _Progress(quiet) as progress:
+        table, confusion, bodies = _morphcog.team_test(
+            _archives(runs), str(robots), classes, images and str(images), str(split), seed, _path(out), _path(data),
+            threads, progress,
+        )
+    path = table.with_suffix(".json") if out is None else _pathlib.Path(_path(out))
+    about = _json.loads(path.read_text(encoding="utf-8"))
+    votes, walks = about["answers"]["votes"]["accuracy"], about["answers"]["walks"]["accuracy"]
+    confusion, bodies = (None if figure is None else Figure(figure) for figure in (confusion, bodies))
+    return Team(
+        votes["accuracy"], tuple(votes["interval"]), walks["accuracy"], _members(about), confusion, bodies, about, path
+    )
+
+
+def _members(about):
+    columns = ["id", "run", "task", "first_group_walks", "not_moved"]
+    rows = [[member[key] for key in columns] + [member["own"]["accuracy"]] for member in about["members"]]
+    return _pandas().DataFrame(rows, columns=[*columns, "accuracy"])
 
 
 def from_evogym(structure, *, driven=False):

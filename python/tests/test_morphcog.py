@@ -107,8 +107,22 @@ def test_a_controller_can_drive_every_sensor_at_every_step():
 @pytest.mark.parametrize(
     "call, words",
     [
-        (lambda: mc.displacements([[[7]]], np.zeros((1, 1, 1))), ["7 is not a material"]),
+        (lambda: mc.displacements([[[7]]], np.zeros((1, 1, 1))), ["body 0: 7 is not a material"]),
         (lambda: mc.displacements([[[1, 0, 1]]], np.zeros((1, 1, 3))), ["hang together"]),
+        (lambda: mc.rollouts([SENSOR] * 3 + [SENSOR * 0], np.zeros((1, 2, 3))), ["body 3: expected at least one"]),
+        (lambda: mc.rollouts([SENSOR], np.zeros((1, 2, 3)), every=0), ["every=0"]),
+        (lambda: mc.show(SENSOR, np.zeros((21, 2, 3))), ["1 to 20 images", "21"]),
+        (lambda: mc.show(SENSOR, np.zeros((2, 3, 3))), ["image 0", "2 × 3 pixels"]),
+        (lambda: mc.show(SENSOR).save("body.pdf"), ["body.pdf", ".gif"]),
+        (lambda: mc.Genome.random("quickstart.toml", -1), ["seed=-1"]),
+        (lambda: mc.Genome.random("quickstart.toml", 1).from_json("{}", "quickstart.toml"), ["genome:", "cppn"]),
+        (lambda: mc.load_run("gallery:")["APUKI"].genome, ["not published"]),
+        (lambda: mc.load_run("gallery:zero_one-1").plot("pie"), ["kind=pie", "spacetime"]),
+        (lambda: mc.load_run("gallery:zero_one-1").plot("archive", "best"), ["robot:", "archive"]),
+        (lambda: mc.load_run("gallery:zero_one-1").metrics, ["there are no metrics"]),
+        (lambda: mc.train("gallery:gaits-6", "4"), ["task"]),
+        (lambda: mc.train([], "4|9"), ["expected one run or more"]),
+        (lambda: mc.team("gallery:zero_one", split="train"), ["split=train"]),
         (lambda: mc.displacements([[[0]]], np.zeros((1, 1, 1))), ["at least one voxel"]),
         (lambda: mc.displacements([[1, 2]], np.zeros((1, 1, 2))), ["body 0", "shape (2,)"]),
         (lambda: mc.displacements([[[1.0]]], np.zeros((1, 1, 1))), ["float64"]),
@@ -142,7 +156,7 @@ def test_a_controller_can_drive_every_sensor_at_every_step():
         (lambda: mc.evolve("quickstart.toml", set=["map_elites.parents"]), ["map_elites.parents", "key=value"]),
         (lambda: mc.evolve("quickstart.toml", set=[3]), ["set:", "dict"]),
         (lambda: mc.Config("quickstart.toml", {"body": {"hight": 3}}), ["body.hight=3", "unknown field"]),
-        (lambda: mc.load_run("gallery:team"), ["expected one run, these are 45: gallery:team-0v1, "]),
+        (lambda: mc.load_run("gallery:team"), ["expected one run", "load_runs", "these are 45: gallery:team-0v1, "]),
         (lambda: mc.load_run("gallery:zero_one-1").evaluate("first:3"), ["robots=first:3: expected all, top:N"]),
         (lambda: mc.load_run("gallery:zero_one-1").evaluate(images="many"), ["images=many"]),
         (lambda: mc.load_run("gallery:zero_one-1").evaluate(split="train"), ["split=train: expected test or validation"]),
@@ -279,18 +293,56 @@ def test_evolve_says_how_far_it_is_unless_it_is_quiet(tmp_path, capsys, monkeypa
     assert capsys.readouterr() == ("", "")
     mc.load_run(tmp_path / "said").evaluate(images=4)
     assert "rollouts" in capsys.readouterr().err
-    # In a terminal it is one line that changes.
+    # In a terminal without tqdm it is one line that changes.
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    monkeypatch.setitem(sys.modules, "tqdm.auto", None)
     progress = mc._Progress(quiet=False)
     progress._least = 0
     with progress:
-        progress("progress", "a long line")
-        progress("progress", "short")
-        progress("note", "a note")
-        progress("progress", "end")
+        progress("progress", "a long line", "{}")
+        progress("progress", "short", "{}")
+        progress("note", "a note", "null")
+        progress("progress", "end", "{}")
     assert capsys.readouterr().err == "a long line\rshort      \ra note\nend\n"
     with pytest.warns(UserWarning, match="careful"):
-        mc._Progress(quiet=True)("warning", "careful")
+        mc._Progress(quiet=True)("warning", "careful", "null")
+
+
+def test_in_a_terminal_tqdm_shows_a_bar_if_it_is_installed(tmp_path, capsys, monkeypatch):
+    pytest.importorskip("tqdm")
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    run = mc.evolve("quickstart.toml", generations=3, out=tmp_path / "run")
+    said = capsys.readouterr().err
+    assert re.search(r"evolving: 100%\|.*\| 3/3 \[.*best=.*coverage=", said), said
+    run.evaluate("best", images=4)
+    assert re.search(r"8/8 \[.* rollouts/s", capsys.readouterr().err.replace("4/4", "8/8"))
+
+
+def test_a_callback_sees_every_generation_and_ends_evolution_where_it_says(tmp_path):
+    seen = []
+    whole = mc.evolve("quickstart.toml", generations=6, out=tmp_path / "whole", quiet=True, callback=seen.append)
+    assert [event["generation"] for event in seen] == [1, 2, 3, 4, 5, 6]
+    last, metrics = seen[-1], whole.metrics.iloc[-1]
+    assert (last["event"], last["generations"]) == ("generation", 6)
+    for key, column in [("best", "obj_max"), ("coverage", "coverage"), ("qd_score", "qd_score")]:
+        assert last[key] == metrics[column]
+    assert last["evaluations"] == metrics.evaluations
+
+    def at_three(event):
+        if event["generation"] == 3:
+            raise StopIteration
+
+    for number, callback in enumerate([at_three, lambda event: event["generation"] == 3]):
+        out = tmp_path / str(number)
+        assert mc.evolve("quickstart.toml", generations=6, out=out, quiet=True, callback=callback).generations == 3
+        again = mc.evolve("quickstart.toml", generations=6, out=out, quiet=True, resume=True)
+        assert again.path.read_bytes() == whole.path.read_bytes()
+    with pytest.raises(ZeroDivisionError):
+        mc.evolve("quickstart.toml", generations=6, out=tmp_path / "x", quiet=True, callback=lambda event: 1 / 0)
+    assert mc.load_run(tmp_path / "x").generations == 1
+    # What a callback returns by chance stops nothing.
+    mc.evolve("quickstart.toml", generations=2, out=tmp_path / "y", quiet=True, callback=lambda event: [1])
+    assert mc.load_run(tmp_path / "y").generations == 2
 
 
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="signals of Unix")
@@ -616,3 +668,138 @@ def test_arrays_become_a_dataset_that_is_read_as_any_other(tmp_path):
     with pytest.raises(mc.Error, match="none: cannot be read"):
         mc.import_dataset(tmp_path / "none", name="x", quiet=True)
     assert not (tmp_path / "x").exists()
+
+
+def test_rollouts_tell_what_displacements_and_worlds_tell():
+    x = np.random.default_rng(1).random((3, 4, 6))
+    bodies = [WALKER, WALKER[:, ::-1], np.where(WALKER == 2, 6, WALKER)]
+    found = mc.rollouts(bodies, x, control_steps=90, every=20)
+    assert np.array_equal(found.displacement, mc.displacements(bodies, x, control_steps=90))
+    assert found.steps.tolist() == [0, 20, 40, 60, 80] and found.path.shape == (3, 3, 5, 2)
+    world = mc.World(bodies[2])
+    world.stimulus = x[1]
+    world.step(60)
+    points = world.points
+    assert found.path[2, 1, 3] == pytest.approx(world.centre, abs=1e-12)
+    shape = (found.width[2, 1, 3], found.height[2, 1, 3])
+    assert shape == pytest.approx(np.ptp(points, axis=0), abs=1e-12)
+    assert found.ground[2, 1, 3] == pytest.approx((points[:, 1] <= 0.01).mean())
+    assert (found.kinetic[..., 0] == 0).all() and (found.kinetic[..., 1:] > 0).all()
+    assert (np.diff(found.drive) > 0).all() and (found.elastic[..., 1:] > 0).all()
+    assert repr(found) == "Rollouts(3 bodies, 3 images, 5 moments to control step 80)"
+    assert mc.rollouts([], x).path.shape == (0, 3, 501, 2)
+    # From where a simulation became unstable, all is nan.
+    config = mc.Config("quickstart.toml", ["physics.time_step=0.01"])
+    wild = mc.rollouts([WALKER], x[:1], control_steps=60, config=config)
+    assert np.isnan(wild.displacement).all() and np.isnan(wild.path[0, 0, -1]).all()
+    assert np.isfinite(wild.path[0, 0, 0]).all()
+
+
+def test_genomes_are_those_of_evolution(run):
+    config = mc.Config("quickstart.toml", {"seed": 3})
+    first = {mc.Genome.random(config, 3, child=child).id for child in range(20)}
+    one = mc.evolve(config, generations=1, out=run.path.parent / "one", quiet=True)
+    assert {robot.id for robot in one} <= first
+    robot = run["best"]
+    genome = robot.genome
+    assert genome.id == robot.id and np.array_equal(genome.body(), robot.body)
+    child = genome.mutate(7)
+    assert child == genome.mutate(7) and child not in (genome, genome.mutate(8))
+    assert child == pickle.loads(pickle.dumps(child)) == mc.Genome.from_json(child.to_json(), config)
+    assert re.fullmatch(r"Genome\(\w{10}, body=7×7, voxels=\d+, muscles=\d+, sensors=\d+\)", repr(child))
+    x = np.zeros((1, 7, 7))
+    assert mc.rollouts([child.body()], x, control_steps=20).displacement.shape == (1, 1)
+
+
+def test_runs_are_iterated_and_say_what_they_are(run):
+    robots = list(run)
+    assert len(run) == len(robots) == len(run.elites) and [robot.id for robot in robots] == list(run.elites.id)
+    assert repr(run).startswith("Run('") and f"robots={len(run)}, best={run['best'].objective:.2f}" in repr(run)
+    assert list(run.metrics.generation)[: run.generations] == list(range(run.generations))
+    published = mc.load_run("gallery:")
+    assert [robot.id for robot in published] == ["APUKI", "IHSUJ", "QMAXD", "RSTAM", "YJTLA"] or len(published) == 5
+    assert published["yjtla"].answers == {"left": [0], "right": [1]} or published["yjtla"].answers["left"] == [1]
+    assert [shipped["best"].task for shipped in mc.load_runs("gallery:zero_one")] == ["0|1"] * 3
+
+
+def test_figures_are_shown_and_saved_by_their_ending(run, tmp_path):
+    for kind in ["archive", "progress", "body", "spacetime", "snapshots"]:
+        figure = run.plot(kind)
+        assert figure._repr_svg_().startswith("<svg") and repr(figure).startswith("Figure('")
+    assert figure.save(tmp_path / "walk.svg").read_text() == figure._repr_svg_()
+    small, large = (figure.save(tmp_path / f"{dpi}.png", dpi=dpi).read_bytes() for dpi in (50, 100))
+    assert small.startswith(b"\x89PNG") and len(small) < len(large)
+    assert run["best"].plot("body")._repr_svg_() == run.plot("body", run["best"].id)._repr_svg_()
+    with pytest.raises(mc.Error, match="ends in .svg or .png"):
+        figure.save(tmp_path / "walk.txt")
+
+
+def test_any_body_is_shown_small_and_saved_as_page_animation_or_picture(run, tmp_path):
+    x = np.random.default_rng(1).random((10, 14, 14))
+    body = np.full((14, 14), 6, np.uint8)
+    body[10:], body[12:, 3:9] = 4, 0
+    shown = mc.show(body, x)
+    assert len(shown._repr_html_()) < 150_000
+    assert shown.displacements == pytest.approx(mc.displacements([body], x)[0].tolist(), abs=1e-12)
+    small = mc.show(SENSOR, x[0, :2, :3], control_steps=20)
+    for name, begin in [("a.html", b"<!"), ("a.gif", b"GIF8"), ("a.png", b"\x89PNG")]:
+        assert small.save(tmp_path / name, every=5).read_bytes().startswith(begin)
+    assert run["best"].gif(tmp_path / "robot.gif", every=50).read_bytes().startswith(b"GIF8")
+    assert run["best"].genome._repr_html_().startswith("<div")
+    world = mc.World(SENSOR)
+    world.step(10)
+    picture = world.render()
+    assert "control_step=10" in repr(picture) and len(picture._repr_html_()) < 30_000
+    assert picture._repr_html_().startswith("<img") and picture.save(tmp_path / "world.png").stat().st_size > 1000
+
+
+FEW = {
+    "data.dataset": "builtin",
+    "protocol.control_steps": 50,
+    "train.random_images": 20,
+    "train.rounds": 1,
+    "train.images": 4,
+    "train.final_images": 4,
+    "train.challengers": 1,
+    "validation.images": 40,
+}
+
+
+def test_a_gait_is_trained_measured_and_tested_as_a_team(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(mc.Stopped, match="stopped"):
+        mc.train(run, "0|1", robots="top:1", set=FEW, out="trained", quiet=True, callback=lambda event: True)
+    seen = []
+    trained = mc.train(
+        run, "0|1", robots="top:1", set=FEW, out="trained", resume=True, quiet=True, callback=seen.append
+    )
+    assert {event["event"] for event in seen} == {"round", "challenge"}
+    assert len(trained) == 1 and trained.path.with_name("audit.json").exists()
+    answers = trained["best"].answers
+    assert sorted(answers["left"] + answers["right"]) == [0, 1]
+    table = trained.response(images=60, task="0|1", set={"protocol.control_steps": 50}, quiet=True)
+    assert list(table.columns) == ["id", "row", "column", "material", "slope", "error"] and len(table) > 0
+    team = mc.team(trained, classes=[0, 1], images=20, quiet=True, out="team.json")
+    assert 0 <= team.interval[0] <= team.accuracy <= team.interval[1] <= 1
+    assert list(team.members.id) == [trained["best"].id] and team.confusion._repr_svg_().startswith("<svg")
+    assert repr(team).startswith("Team(1 robots, 20 images, accuracy=")
+
+
+def test_ctrl_c_ends_rollouts():
+    code = """
+import signal, time, numpy as np, morphcog as mc
+signal.signal(signal.SIGINT, signal.default_int_handler)
+body = np.full((14, 14), 3, np.uint8); body[:7] = 4
+print("begins", flush=True)
+try:
+    mc.rollouts([body] * 4000, np.zeros((1, 14, 14)), every=100)
+except KeyboardInterrupt:
+    print(time.time())
+"""
+    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    assert child.stdout.readline() == "begins\n"
+    time.sleep(1)
+    sent = time.time()
+    child.send_signal(signal.SIGINT)
+    said, _ = child.communicate(timeout=20)
+    assert child.returncode == 0 and float(said) - sent < 1

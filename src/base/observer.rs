@@ -65,4 +65,5 @@ pub struct Generation {
     /// Fraction of the possible cells that are filled, from 0 to 1.
     pub(crate) coverage: f64,
     pub(crate) evaluations: u64,
+    pub(crate) qd_score: f64,
 }

@@ -23,9 +23,7 @@ use crate::commands::train;
 use crate::commands::train::{TrainOptions, TrainOutcome};
 use crate::config::audit::Criteria;
 use crate::images::whereabouts::Whereabouts;
-use crate::robots;
 use crate::robots::selection::Selection;
-use crate::shipped;
 use crate::shipped::gallery;
 use crate::store::folder;
 use crate::store::folder::IfExists;
@@ -166,26 +164,19 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
         .iter()
         .map(|name| format!("data.dataset={name}"));
     let set: Vec<String> = dataset.chain(args.set).collect();
-    let whereabouts = Whereabouts::given(args.data.as_deref()).and_of(&archives[0]);
-    let of_gaits = robots::open(&archives[0])?;
-    let text = args
-        .task
-        .as_deref()
-        .expect("clap requires it without pairs");
-    let groups =
-        training::groups_of(text, &of_gaits.run.config, &set, &whereabouts).map_err(|error| {
-            match error.argument {
-                None => error.about("task"),
-                Some(_) => error,
-            }
-        })?;
+    let task = args.task.as_deref();
+    let task = task.expect("clap requires it without pairs");
+    let groups = train::groups(&archives[0], task, &set, args.data.as_deref())?;
     let with = Resources::of(args.threads, args.data);
     let (archive, robots) = match archives.as_slice() {
-        [archive] => (archive.clone(), robots.unwrap_or(Selection::Top(GAITS))),
+        [archive] => (
+            archive.clone(),
+            robots.unwrap_or(Selection::Top(train::GAITS[0])),
+        ),
         _ => {
             let gaits = Gaits {
                 archives,
-                robots: robots.unwrap_or(Selection::Top(GAITS_OF_EACH)),
+                robots: robots.unwrap_or(Selection::Top(train::GAITS[1])),
                 groups: groups.clone(),
                 seed: args.seed,
                 set: set.clone(),
@@ -195,15 +186,10 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
             })?
         }
     };
-    let name = name(&archive, &groups, args.seed);
-    let beside = match shipped::is_named(&archive) {
-        true => Some(Path::new(folder::RUNS)),
-        false => archive.parent().and_then(|folder| folder.parent()),
-    };
+    let name = train::name(&archive, &groups, args.seed);
     let out = args
         .out
-        .or(beside.map(|folder| folder.join(&name)))
-        .unwrap_or_else(|| PathBuf::from(&name));
+        .unwrap_or_else(|| train::default_out(&archive, &name));
     let if_exists = match (args.resume, args.force) {
         (true, _) => IfExists::Resume,
         (_, true) => IfExists::Overwrite,
@@ -222,27 +208,6 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
     trained(&options, with, console)
 }
 
-/// Default number of gaits to try.
-const GAITS: usize = 4;
-
-/// Returns the name of a training: the archive's folder and the task.
-fn name(archive: &Path, groups: &Groups, seed: Option<u64>) -> String {
-    let folder = archive
-        .parent()
-        .and_then(Path::file_name)
-        .map(|name| name.to_string_lossy());
-    let of = match shipped::name(archive) {
-        Some((of, "")) => of,
-        Some((_, name)) => name,
-        None => folder.as_deref().unwrap_or("run"),
-    };
-    let seed = seed.map_or(String::new(), |seed| format!("-seed{seed}"));
-    format!("{of}-{}{seed}", groups.in_files())
-}
-
-/// Gaits of each of several archives that a training chooses from.
-const GAITS_OF_EACH: usize = 5;
-
 /// Trains the pairs of a team, or handles a request about them.
 fn pairs(args: TrainArgs, console: &Console) -> Result<(), Error> {
     let mut archives = args.archives.paths();
@@ -251,7 +216,7 @@ fn pairs(args: TrainArgs, console: &Console) -> Result<(), Error> {
     }
     let options = PairsOptions {
         archives,
-        robots: selected(args.robots)?.unwrap_or(Selection::Top(GAITS_OF_EACH)),
+        robots: selected(args.robots)?.unwrap_or(Selection::Top(train::GAITS[1])),
         dataset: args.dataset.clone(),
         classes: (!args.classes.is_empty()).then_some(args.classes.clone()),
         seed: args.seed,
@@ -384,7 +349,7 @@ pub(super) fn after_evolution(
         Whereabouts::given(session.data_folder()).and_of_resumed(*if_exists, &archive);
     let names = whereabouts.class_names(&config.data)?;
     let groups = &Groups::from(groups.clone()).named(&names);
-    let name = name(&archive, groups, None);
+    let name = train::name(&archive, groups, None);
     let of_training = out.with_file_name(&name);
     // Obstacles must be reported before the gaits evolve for an hour.
     training::check(config, groups.classes(), &whereabouts)?;
@@ -394,7 +359,7 @@ pub(super) fn after_evolution(
     Ok(TrainOptions {
         out: of_training,
         archive,
-        robots: Selection::Top(GAITS),
+        robots: Selection::Top(train::GAITS[0]),
         groups: groups.clone(),
         seed: None,
         set: Vec::new(),

@@ -10,8 +10,7 @@ use crate::images::held_out;
 use crate::images::training::TrainingImages;
 use crate::images::whereabouts;
 use crate::images::whereabouts::Whereabouts;
-use crate::qd::Variation;
-use crate::search::evolve::{Files, Mutations, Run, unmade};
+use crate::search::evolve::{Files, Mutations, Run};
 use crate::search::{resume, validation};
 use crate::store::folder::{IfExists, RunFolder};
 use crate::store::metrics::{Metrics, Totals};
@@ -93,13 +92,8 @@ pub fn evolve(options: &EvolveOptions, session: &Session) -> Result<EvolveOutcom
         .expect("its training images were loaded just now");
     let training = TrainingImages::of(config, &dataset)?;
     held_out::check(config, &[], "data.images_per_class", &dataset)?;
-    let mutations = Mutations {
-        seed: config.seed,
-        spec: config.body_spec(),
-        params: &config.genome,
-        session,
-    };
-    let first = mutations.random_immigrant(0, 0).map_err(unmade);
+    let mutations = Mutations::new(config, config.seed, session);
+    let first = mutations.random(0, 0);
     // Only the leading rank has a folder.
     let ranks = session.ranks;
     let open = || RunFolder::open(&options.out, options.if_exists, session);

@@ -10,7 +10,7 @@ pub mod compare;
 pub mod data;
 pub mod eval;
 pub mod evolve;
-pub(crate) mod pairs;
+pub mod pairs;
 pub mod plan;
 #[cfg(feature = "figures")]
 pub mod plot;
@@ -18,11 +18,11 @@ pub mod replay;
 #[cfg(feature = "figures")]
 pub(crate) mod report;
 pub(crate) mod reproduce;
-pub(crate) mod response;
+pub mod response;
 pub mod schema;
 pub mod simulate;
 pub(crate) mod sweep;
 pub(crate) mod table;
 pub(crate) mod tasks;
-pub(crate) mod team;
+pub mod team;
 pub mod train;

@@ -12,7 +12,7 @@ use crate::base::stop::Stopped;
 use crate::base::table;
 use crate::commands::audit;
 use crate::commands::response::{self, ResponseOptions};
-pub(crate) use crate::commands::tasks::Gaits;
+pub use crate::commands::tasks::Gaits;
 use crate::commands::tasks::{AuditStep, PairRun, Run, Steps, Task, TaskFolders};
 use crate::commands::train::{self, TrainOptions};
 use crate::config::Config;
@@ -268,7 +268,7 @@ struct Ranked {
 ///
 /// # Errors
 /// Returns an error if none can be trained, or if it was stopped.
-pub(crate) fn best_gait(of: &Gaits, session: &Session) -> Result<(PathBuf, Selection), Error> {
+pub fn best_gait(of: &Gaits, session: &Session) -> Result<(PathBuf, Selection), Error> {
     measure(of, session)?;
     let ranked = session.pool()?.install(|| ranked(of, session))?;
     let best = ranked.into_iter().next().ok_or_else(unstable)?;

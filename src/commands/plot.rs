@@ -58,7 +58,8 @@ impl FigureKind {
         (FigureKind::Gates, "gates"),
     ];
 
-    pub(crate) fn is_of_robot(self) -> bool {
+    /// Returns true if it shows a robot, and false if it shows a run.
+    pub fn is_of_robot(self) -> bool {
         matches!(
             self,
             FigureKind::Body | FigureKind::Spacetime | FigureKind::Snapshots
@@ -235,6 +236,40 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
         all.into_iter().try_for_each(write)?;
     }
     Ok(PlotOutcome { progress, gates })
+}
+
+/// Makes one figure, of a run or of a robot of it, and writes nothing.
+///
+/// # Errors
+/// Returns an error if an input is invalid, there are several runs or robots, or the figure cannot be
+/// made.
+pub fn one(wanted: &PlotOptions, session: &Session) -> Result<Figure, Error> {
+    let [path] = &wanted.archives[..] else {
+        return Err(Error::usage("expected one run".to_string()).about("archive"));
+    };
+    let figure = match wanted.kind {
+        kind if kind.is_of_robot() => {
+            let [robot] = &wanted.robots[..] else {
+                return Err(Error::usage("expected one robot".to_string()).about("robot"));
+            };
+            of_robot(wanted, robot)?.figure
+        }
+        FigureKind::Gates => {
+            let source = StoredRun::read(path)?;
+            let found = analysis::gates::walks(&source, session)?;
+            plot::gates(&found, &source.run.name)
+        }
+        FigureKind::Progress => {
+            let run = RunFile::read(path)?;
+            let line = Progress::of(&run, path)?;
+            match line.moments.len() {
+                0 | 1 => return Err(too_short(path, &run, line.moments.len())),
+                _ => plot::progress(&[line]),
+            }
+        }
+        kind => of_run(kind, path)?,
+    };
+    Ok(figure.on(wanted.background))
 }
 
 /// Encodes a figure as PNG; notes if its resolution is lower than usual.

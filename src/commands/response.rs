@@ -37,33 +37,40 @@ use std::path::PathBuf;
 /// conditions. Larger batches overshoot; smaller ones leave cores idle at their ends.
 pub(crate) const BATCH: usize = 60;
 
+/// The robots to measure, and the end of a measurement.
 #[derive(Clone, Debug)]
-pub(crate) struct ResponseOptions {
-    pub(crate) archive: PathBuf,
-    pub(crate) robots: Vec<String>,
+pub struct ResponseOptions {
+    /// The run.json.
+    pub archive: PathBuf,
+    /// The robots, by ids, their beginnings or "best".
+    pub robots: Vec<String>,
     /// True if only robots count that an audit found physical.
-    pub(crate) physical_only: bool,
+    pub physical_only: bool,
     /// Two groups of classes, to estimate the accuracy that training could reach.
-    pub(crate) task: Option<String>,
+    pub task: Option<String>,
     /// Config keys that a training would change, as `stimulus.margin=5`; only with a task.
-    pub(crate) set: Vec<String>,
+    pub set: Vec<String>,
     /// Most rollouts per robot.
-    pub(crate) images: usize,
+    pub images: usize,
     /// Relative error of the slopes at which a measurement ends.
-    pub(crate) error: f64,
+    pub error: f64,
     /// Seed of the random images; `None`: the run's, as in `train`.
-    pub(crate) seed: Option<u64>,
+    pub seed: Option<u64>,
     /// Path of the results (response.json; CSV and pictures go beside it).
-    pub(crate) out: PathBuf,
+    pub out: PathBuf,
 }
 
+/// The result of a measurement.
 #[derive(Clone, Debug)]
-pub(crate) struct ResponseOutcome {
-    pub(crate) file: ResponseFile,
+pub struct ResponseOutcome {
+    /// The results, as written to `response.json`.
+    pub file: ResponseFile,
     /// Pictures of its robots, still to be drawn.
     pub(crate) pictures: Vec<[PathBuf; 3]>,
-    pub(crate) stopped: bool,
-    pub(crate) unwritten: Option<Error>,
+    /// True if it was stopped.
+    pub stopped: bool,
+    /// Error that kept the results from being written.
+    pub unwritten: Option<Error>,
 }
 
 struct Subject {
@@ -82,10 +89,10 @@ struct Provenance {
 
 /// Measures the responses of robots and writes the results after each one, so that stopping keeps
 /// them. Leaves out robots that cannot be measured, with a warning, if others can.
-pub(crate) fn measure(
-    options: &ResponseOptions,
-    session: &Session,
-) -> Result<ResponseOutcome, Error> {
+///
+/// # Errors
+/// Returns an error if an option, the run or the data are unsuitable, or no robot can be measured.
+pub fn measure(options: &ResponseOptions, session: &Session) -> Result<ResponseOutcome, Error> {
     check_numbers(options)?;
     let provenance = provenance(options)?;
     let config = &provenance.config;

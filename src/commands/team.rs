@@ -52,31 +52,40 @@ const WRITE_EVERY: Duration = Duration::from_secs(10);
 /// Seconds from which a test is said to be long.
 const LONG: f64 = 20.0;
 
+/// The runs of a team, and its test.
 #[derive(Clone, Debug)]
-pub(crate) struct TeamOptions {
-    pub(crate) archives: Vec<PathBuf>,
+pub struct TeamOptions {
+    /// The run.json files.
+    pub archives: Vec<PathBuf>,
     /// Their robots. Ids are looked up in all runs together; other selections apply to each run.
-    pub(crate) robots: Selection,
+    pub robots: Selection,
     /// Classes to tell apart, by name or number; `None`: all of the dataset.
-    pub(crate) classes: Option<Vec<String>>,
+    pub classes: Option<Vec<String>>,
     /// Number of images; `None`: [`usual`].
-    pub(crate) images: Option<HowMany>,
-    pub(crate) split: HeldOut,
+    pub images: Option<HowMany>,
+    /// The images: test, or validation.
+    pub split: HeldOut,
     /// Seed for drawing images, and robots with `random:N`.
-    pub(crate) seed: u64,
+    pub seed: u64,
     /// Path of the results (team.json; team.csv goes beside it).
-    pub(crate) out: PathBuf,
+    pub out: PathBuf,
 }
 
+/// The result of a test.
 #[derive(Clone, Debug)]
-pub(crate) struct TeamOutcome {
-    pub(crate) file: TeamFile,
-    pub(crate) unwritten: Option<Error>,
+pub struct TeamOutcome {
+    /// The results, as written to `team.json`.
+    pub file: TeamFile,
+    /// Error that kept the results from being written.
+    pub unwritten: Option<Error>,
 }
 
 /// Tests a team on images, block by block. Writes the file every few seconds and when stopped; the
 /// same command goes on from there.
-pub(crate) fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutcome, Error> {
+///
+/// # Errors
+/// Returns an error if an option, a run or the data are unsuitable.
+pub fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutcome, Error> {
     let archives = options.archives.iter();
     let sources = archives
         .map(|path| robots::open(path))
@@ -329,7 +338,7 @@ fn classes(options: &TeamOptions, dataset: &Dataset) -> Result<Vec<u8>, Error> {
 }
 
 /// Returns the default file name of results on these images.
-pub(crate) fn own_name(split: HeldOut) -> &'static str {
+pub fn own_name(split: HeldOut) -> &'static str {
     match split {
         HeldOut::Test => TEAM_JSON,
         HeldOut::Validation => TEAM_VALIDATION_JSON,

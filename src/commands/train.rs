@@ -14,7 +14,8 @@ use crate::response::probing::Probing;
 use crate::robots;
 use crate::robots::selection::{Selection, VALIDATED};
 use crate::search::validation;
-use crate::store::folder::{IfExists, RunFolder};
+use crate::shipped;
+use crate::store::folder::{self, IfExists, RunFolder};
 use crate::store::images::ImageRef;
 use crate::store::metrics::{Metrics, Totals};
 use crate::store::names::{RUN_JSON, TRAINING_JSON};
@@ -26,9 +27,12 @@ use crate::training::gaits::{Candidate, candidates, key, measured, origin};
 use crate::training::log::Log;
 use crate::training::rounds::TrainedDesign;
 use crate::training::trainer::Trainer;
-use crate::training::{check_groups, config_of, with_fitting_margin, with_images};
+use crate::training::{self, check_groups, config_of, with_fitting_margin, with_images};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+
+/// Default number of gaits to try: of one run, and of each of several.
+pub const GAITS: [usize; 2] = [4, 5];
 
 /// The gaits to train, the task, and the output folder.
 #[derive(Clone, Debug)]
@@ -62,6 +66,13 @@ pub struct TrainOutcome {
     pub(crate) size: [usize; 2],
     /// Results on validation images; `None` if validation was stopped.
     pub(crate) validated: Option<Vec<Validated>>,
+}
+
+impl TrainOutcome {
+    /// Returns false if it was stopped while validating the robot.
+    pub fn is_validated(&self) -> bool {
+        self.validated.is_some()
+    }
 }
 
 /// Trains a robot and validates it.
@@ -168,6 +179,49 @@ pub fn train(options: &TrainOptions, session: &Session) -> Result<TrainOutcome, 
         size,
         validated,
     })
+}
+
+/// Parses the two groups of classes of a task, such as `4|9` or `cat|dog`, for gaits of a run.
+///
+/// # Errors
+/// Returns an error if the run, a key of `set` or the task is unsuitable.
+pub fn groups(
+    archive: &Path,
+    task: &str,
+    set: &[String],
+    data: Option<&Path>,
+) -> Result<Groups, Error> {
+    let of_gaits = robots::open(archive)?;
+    let whereabouts = Whereabouts::given(data).and_of(archive);
+    let groups = training::groups_of(task, &of_gaits.run.config, set, &whereabouts);
+    groups.map_err(|error| match error.argument {
+        None => error.about("task"),
+        Some(_) => error,
+    })
+}
+
+/// Returns the name of a training: the archive's folder and the task.
+pub fn name(archive: &Path, groups: &Groups, seed: Option<u64>) -> String {
+    let folder = archive
+        .parent()
+        .and_then(Path::file_name)
+        .map(|name| name.to_string_lossy());
+    let of = match shipped::name(archive) {
+        Some((of, "")) => of,
+        Some((_, name)) => name,
+        None => folder.as_deref().unwrap_or("run"),
+    };
+    let seed = seed.map_or(String::new(), |seed| format!("-seed{seed}"));
+    format!("{of}-{}{seed}", groups.in_files())
+}
+
+/// Returns the default folder of a training of this name: beside that of the gaits, or in `runs`.
+pub fn default_out(archive: &Path, name: &str) -> PathBuf {
+    let beside = match shipped::is_named(archive) {
+        true => Some(Path::new(folder::RUNS)),
+        false => archive.parent().and_then(|folder| folder.parent()),
+    };
+    beside.map_or_else(|| PathBuf::from(name), |folder| folder.join(name))
 }
 
 /// Checks that the output folder is not that of the gaits, whose run would be overwritten.

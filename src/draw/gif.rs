@@ -36,10 +36,11 @@ pub(crate) fn write(
     write_whole(path, &encode(recording, options)?)
 }
 
-pub(crate) fn encode(
-    recording: &Recording,
-    options: &FilmOptions,
-) -> Result<Vec<u8>, PictureError> {
+/// Encodes a recording as an animated GIF that loops for ever.
+///
+/// # Errors
+/// Returns a [`PictureError`] if the recording cannot be drawn with these options.
+pub fn encode(recording: &Recording, options: &FilmOptions) -> Result<Vec<u8>, PictureError> {
     in_pool(|| encoded(recording, options))?
 }
 

@@ -27,6 +27,9 @@ const COARSE_STEPS: f64 = 50.0;
 /// The approximate number of coordinates in a small page: ten moments a cycle for a body of 14 × 14
 /// voxels under two images.
 const SMALL: usize = 100_000;
+/// The maximum size of a small page's recording, bytes in base64: with the script and a still picture,
+/// a notebook's robot stays below 150 kB.
+const MOST_SMALL: usize = 85_000;
 /// Code of a position that is not finite or over 163 voxel lengths from the frame's origin.
 const NOWHERE: i16 = i16::MIN;
 /// The maximum size of positions in a page, bytes (a third more in base64). Longer recordings keep
@@ -75,10 +78,20 @@ pub fn small_page(
 ) -> Result<String, PictureError> {
     let walk = Walk::new(recording)?;
     let coordinates = walk.frames() * 2 * points(recording);
-    let (mut rollout, positions) = moments(&walk, coordinates.div_ceil(SMALL).max(1), COARSE_STEPS);
-    rollout["positions"] = packed_bytes(&differences(&positions, 2 * points(recording)))?.into();
-    rollout["small"] = true.into();
-    Ok(filled(recording, title, metadata, &pack(&rollout)?))
+    let mut every = coordinates.div_ceil(SMALL).max(1);
+    let packed = loop {
+        let (mut rollout, positions) = moments(&walk, every, COARSE_STEPS);
+        rollout["positions"] =
+            packed_bytes(&differences(&positions, 2 * points(recording)))?.into();
+        rollout["small"] = true.into();
+        let packed = pack(&rollout)?;
+        // Bodies that shake a lot compress badly; with two moments of each image there is no less.
+        if packed.len() <= MOST_SMALL || every >= walk.frames() {
+            break packed;
+        }
+        every += every.div_ceil(4);
+    };
+    Ok(filled(recording, title, metadata, &packed))
 }
 
 /// Fills the template with a recording, as JSON or packed.

@@ -15,7 +15,7 @@ mod lzw;
 pub(crate) mod palette;
 pub(crate) mod panel;
 pub mod plot;
-pub(crate) mod raster;
+pub mod raster;
 pub(crate) mod report;
 pub(crate) mod scene;
 pub(crate) mod sheet;

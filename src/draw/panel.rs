@@ -158,7 +158,8 @@ pub(crate) fn readout(walk: &Walk, frame: usize) -> Caption {
     } else {
         frames.end.saturating_sub(1)
     };
-    let step = frame.saturating_sub(frames.start);
+    let every = walk.recording().every;
+    let step = every * frame.saturating_sub(frames.start);
     let cycles = step as f64 / walk.recording().cycle.max(1) as f64;
     let d = walk.displacement(frame);
     let arrow = if d.abs() < 0.005 {
@@ -173,7 +174,7 @@ pub(crate) fn readout(walk: &Walk, frame: usize) -> Caption {
         label: label.clone(),
         time: format!(
             "step {step}/{} · cycle {}",
-            last - frames.start,
+            every * (last - frames.start),
             number::fixed(cycles, 1)
         ),
         displacement: format!("{arrow} {}", signed(d)),
@@ -286,10 +287,12 @@ fn readouts(
     let end = line([0.0, 49.0], &words.displacement, LARGE, true, colour::TRACE);
     line([end + BEFORE_UNIT, 49.0], UNIT, SMALL, false, colour::FAINT);
     line([0.0, 67.0], &words.verdict, LARGE, true, colour::INK);
-    let name = format!("robot {}", recording.robot);
+    let end = recording.unstable.then_some("ended unstable");
+    let name = Some(format!("robot {}", recording.robot)).filter(|_| !recording.robot.is_empty());
+    let parts: Vec<&str> = name.as_deref().into_iter().chain(end).collect();
     let (note, colour) = match recording.unstable {
-        true => (format!("{name} · ended unstable"), colour::ALARM),
-        false => (name, colour::FAINT),
+        true => (parts.join(" · "), colour::ALARM),
+        false => (parts.join(" · "), colour::FAINT),
     };
     line([0.0, 83.0], &note, SMALL, false, colour);
 }

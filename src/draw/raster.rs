@@ -14,6 +14,17 @@ use tiny_skia::{FillRule, LineCap, LineJoin, Paint, PathBuilder, Pixmap, Stroke,
 /// invisible, near enough for 32-bit floats.
 const BEYOND: f64 = 8192.0;
 
+/// Returns a frame of a walk as a PNG of this width in pixels.
+///
+/// # Errors
+/// Returns a [`PictureError`] if the width is out of range, or the picture cannot be encoded.
+pub fn png(walk: &Walk, frame: usize, width: u32) -> Result<Vec<u8>, PictureError> {
+    let picture = picture(walk, frame, &Stage::new(walk, width)?)?;
+    picture
+        .encode_png()
+        .map_err(|error| PictureError::Encode(error.to_string()))
+}
+
 /// Renders the picture of a frame as opaque RGBA.
 pub(crate) fn picture(walk: &Walk, frame: usize, stage: &Stage) -> Result<Pixmap, PictureError> {
     let (width, height) = (stage.width, stage.height);

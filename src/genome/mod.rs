@@ -88,7 +88,11 @@ impl Genome {
         mutation::mutate(&mut self.cppn, params, rng);
     }
 
-    pub(crate) fn body(&self, height: usize, width: usize) -> Result<Body, BodyError> {
+    /// Returns the body of this size that it describes, valid or not.
+    ///
+    /// # Errors
+    /// Returns a [`BodyError`] if the size is impossible for a body.
+    pub fn body(&self, height: usize, width: usize) -> Result<Body, BodyError> {
         let described = self.cppn.express(height, width)?;
         if self.edits.is_empty() {
             Ok(described)

@@ -6,8 +6,17 @@ pub mod selection;
 use crate::base::error::Error;
 use crate::robots::selection::Selection;
 use crate::store::folder;
+use crate::store::run::RunFile;
 use crate::store::stored_run::StoredRun;
 use std::path::{Path, PathBuf};
+
+/// Reads a run.json, a shipped run, or the built-in run of the published robots.
+///
+/// # Errors
+/// Returns an error if it cannot be read.
+pub fn read(path: &Path) -> Result<RunFile, Error> {
+    open(path).map(|stored| stored.run)
+}
 
 /// Opens a run.json, or the built-in run of the published robots.
 pub(crate) fn open(path: &Path) -> Result<StoredRun, Error> {

@@ -392,6 +392,7 @@ impl<'a> Run<'a> {
             best: stats.obj_max,
             coverage: stats.coverage,
             evaluations: self.totals.evaluations,
+            qd_score: stats.qd_score,
         }
     }
 
@@ -422,12 +423,62 @@ impl<'a> Run<'a> {
 }
 
 /// Random immigrants and mutated offspring, each from a random stream of its own.
-pub(crate) struct Mutations<'a> {
-    pub(crate) seed: u64,
-    pub(crate) spec: BodySpec,
-    pub(crate) params: &'a MutationParams,
+pub struct Mutations<'a> {
+    seed: u64,
+    spec: BodySpec,
+    params: &'a MutationParams,
     /// Makes no more robots once it is stopped.
-    pub(crate) session: &'a Session<'a>,
+    session: &'a Session<'a>,
+}
+
+impl<'a> Mutations<'a> {
+    /// Returns those of a config; `seed` is that of the random streams.
+    pub fn new(config: &'a Config, seed: u64, session: &'a Session<'a>) -> Self {
+        Mutations {
+            seed,
+            spec: config.body_spec(),
+            params: &config.genome,
+            session,
+        }
+    }
+
+    /// Makes the random individual that a run with this seed makes in a generation as its
+    /// `child`-th.
+    ///
+    /// # Errors
+    /// Returns an error if the config has no valid body, or the session was stopped.
+    pub fn random(&self, generation: u64, child: u64) -> Result<(Genome, Body), Error> {
+        self.immigrant(generation, child).map_err(unmade)
+    }
+
+    /// Makes the offspring of a genome that a run with this seed makes in a generation as its
+    /// `child`-th.
+    ///
+    /// # Errors
+    /// Returns an error if no mutation gives a valid body, or the session was stopped.
+    pub fn mutated(
+        &self,
+        parent: &Genome,
+        generation: u64,
+        child: u64,
+    ) -> Result<(Genome, Body), Error> {
+        self.child(parent, generation, child).map_err(unmade)
+    }
+
+    fn immigrant(&self, generation: u64, child: u64) -> Result<(Genome, Body), GenomeError> {
+        let rng = &mut stream(self.seed, Purpose::RandomImmigrant, generation, child);
+        Genome::random_unless(self.spec, self.params, rng, self.session)
+    }
+
+    fn child(
+        &self,
+        parent: &Genome,
+        generation: u64,
+        child: u64,
+    ) -> Result<(Genome, Body), GenomeError> {
+        let rng = &mut stream(self.seed, Purpose::Mutation, generation, child);
+        parent.offspring_unless(self.spec, self.params, rng, self.session)
+    }
 }
 
 fn unevaluated((genome, body): (Genome, Body), generation: u64, parent: Option<&Robot>) -> Robot {
@@ -445,7 +496,7 @@ fn unevaluated((genome, body): (Genome, Body), generation: u64, parent: Option<&
     }
 }
 
-pub(crate) fn unmade(error: GenomeError) -> Error {
+fn unmade(error: GenomeError) -> Error {
     match error {
         GenomeError::Stopped(stopped) => stopped.into(),
         error => Error::input(format!("body: {error}")),
@@ -456,19 +507,15 @@ impl Variation<Robot> for Mutations<'_> {
     type Error = GenomeError;
 
     fn random_immigrant(&self, generation: u64, child: u64) -> Result<Robot, GenomeError> {
-        let rng = &mut stream(self.seed, Purpose::RandomImmigrant, generation, child);
         Ok(unevaluated(
-            Genome::random_unless(self.spec, self.params, rng, self.session)?,
+            self.immigrant(generation, child)?,
             generation,
             None,
         ))
     }
 
     fn offspring(&self, parent: &Robot, generation: u64, child: u64) -> Result<Robot, GenomeError> {
-        let rng = &mut stream(self.seed, Purpose::Mutation, generation, child);
-        let made = parent
-            .genome
-            .offspring_unless(self.spec, self.params, rng, self.session)?;
+        let made = self.child(&parent.genome, generation, child)?;
         Ok(unevaluated(made, generation, Some(parent)))
     }
 }

@@ -1,6 +1,6 @@
 //! The evolution of bodies, resuming it, and the choice of robots on validation images.
 
-pub(crate) mod evolve;
+pub mod evolve;
 pub mod held_out_run;
 pub mod one_by_one;
 pub(crate) mod resume;

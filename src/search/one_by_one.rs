@@ -28,7 +28,8 @@ pub struct RobotChoice {
 /// A robot, by name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Named {
-    pub(crate) archive: PathBuf,
+    /// The run.json.
+    pub archive: PathBuf,
     /// Its id, the beginning of one, or "best".
     pub robot: String,
 }

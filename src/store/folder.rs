@@ -446,7 +446,7 @@ pub fn beside(archive: &Path, name: &str) -> PathBuf {
 
 /// Returns the default path of joint results of several runs: in their common folder. With shipped
 /// runs it is in the current folder, with the name of their set if they share one.
-pub(crate) fn beside_all(archives: &[PathBuf], name: &str) -> PathBuf {
+pub fn beside_all(archives: &[PathBuf], name: &str) -> PathBuf {
     let [first, others @ ..] = archives else {
         return PathBuf::from(name);
     };

@@ -11,7 +11,8 @@ pub(crate) const EVAL_JSON: &str = "eval.json";
 
 /// The results of `eval` on validation images.
 pub(crate) const EVAL_VALIDATION_JSON: &str = "eval-validation.json";
-pub(crate) const RESPONSE_JSON: &str = "response.json";
+/// The responses that `response` measures.
+pub const RESPONSE_JSON: &str = "response.json";
 pub(crate) const TEAM_JSON: &str = "team.json";
 /// The results of `team` on validation images.
 pub(crate) const TEAM_VALIDATION_JSON: &str = "team-validation.json";
@@ -27,7 +28,7 @@ pub(crate) const VALIDATION_JSON: &str = "validation.json";
 pub(crate) const DATA_FOLDER: &str = "data-folder.json";
 
 /// The archive with everything that made it.
-pub(crate) const RUN_JSON: &str = "run.json";
+pub const RUN_JSON: &str = "run.json";
 pub(crate) const CONFIG: &str = "config.toml";
 
 /// The elites for pyribs.

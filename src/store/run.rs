@@ -347,7 +347,7 @@ impl RunFile {
     }
 
     /// Returns the judge of a robot's walks, or `None` for a gait or a robot of the same-way task.
-    pub(crate) fn judge(&self, robot: &Robot) -> Option<Readout> {
+    pub fn judge(&self, robot: &Robot) -> Option<Readout> {
         if self.config.measures_response() {
             return None;
         }

@@ -120,11 +120,11 @@ pub(crate) fn is_correct(
 
 /// The classes that robots of a task name by walking left or right.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub(crate) struct Readout {
+pub struct Readout {
     /// Classes named by walking left.
-    pub(crate) left: Vec<u8>,
+    pub left: Vec<u8>,
     /// Classes named by walking right.
-    pub(crate) right: Vec<u8>,
+    pub right: Vec<u8>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]

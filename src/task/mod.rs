@@ -14,3 +14,4 @@ pub mod recording;
 pub mod rollout;
 pub mod score;
 pub mod stimulus;
+pub mod trace;

@@ -106,10 +106,12 @@ pub struct Recording {
     pub phases: Vec<Phase>,
     /// All frames.
     pub frames: Vec<Frame>,
+    /// Control steps from one frame to the next: 1, except for a single moment.
+    pub(crate) every: usize,
     /// Control steps per actuation cycle (50).
     pub(crate) cycle: usize,
     /// True if the rollout ended early as unstable.
-    pub(crate) unstable: bool,
+    pub unstable: bool,
     /// Meaning of the robot's walks; none for a robot without a task.
     pub(crate) judge: Option<Readout>,
     /// Names of the classes.

@@ -95,28 +95,12 @@ impl<'a> Rollout<'a> {
     }
 
     pub(crate) fn frame(&self) -> Frame {
-        let physics = self.physics();
-        let ground = f64::from(physics.ground_row) * physics.cell_size;
-        let place = |[x, y]: [f64; 2]| {
-            [
-                voxel_lengths(x, physics),
-                voxel_lengths(y - ground, physics),
-            ]
-        };
-        Frame {
-            points: self.world.points().map(place).collect(),
-            centre: place(self.world.centre_of_mass()),
-        }
+        frame(&self.world)
     }
 
     /// Returns the voxels with their corners, as indices into a [`Rollout::frame`]'s points.
     pub(crate) fn voxels(&self) -> Vec<VoxelCorners> {
-        let corner = |((row, column), corners)| VoxelCorners {
-            row,
-            column,
-            corners,
-        };
-        self.world.voxels().map(corner).collect()
+        voxels(&self.world)
     }
 
     pub(crate) fn reset(&mut self) {
@@ -239,6 +223,7 @@ pub fn record(
         voxels: rollout.voxels(),
         phases: Vec::new(),
         frames: Vec::new(),
+        every: 1,
         cycle: physics.cycle_steps as usize,
         unstable: false,
         judge: None,
@@ -272,6 +257,59 @@ pub fn record(
         }
     }
     recording
+}
+
+/// Records the start of a simulation and its present moment under a stimulus, for a picture.
+pub fn moment(world: &World, body: &Body, stimulus: Grid<f64>) -> Recording {
+    let mut start = world.clone();
+    start.reset();
+    let frames = vec![frame(&start), frame(world)];
+    let seen = LabelledStimulus {
+        class: 0,
+        label: "now".to_string(),
+        stimulus,
+    };
+    Recording {
+        robot: String::new(),
+        body: body.clone(),
+        voxels: voxels(world),
+        phases: vec![Phase {
+            first_frame: 0,
+            seen,
+            displacement: frames[1].centre[0] - frames[0].centre[0],
+        }],
+        frames,
+        every: world.control_step() as usize,
+        cycle: world.system().physics().cycle_steps as usize,
+        unstable: false,
+        judge: None,
+        names: ClassNames::default(),
+    }
+}
+
+fn frame(world: &World) -> Frame {
+    let physics = world.system().physics();
+    let ground = f64::from(physics.ground_row) * physics.cell_size;
+    let place = |[x, y]: [f64; 2]| {
+        [
+            voxel_lengths(x, physics),
+            voxel_lengths(y - ground, physics),
+        ]
+    };
+    Frame {
+        points: world.points().map(place).collect(),
+        centre: place(world.centre_of_mass()),
+    }
+}
+
+/// Returns the voxels with their corners, as indices into a [`frame`]'s points.
+fn voxels(world: &World) -> Vec<VoxelCorners> {
+    let corner = |((row, column), corners)| VoxelCorners {
+        row,
+        column,
+        corners,
+    };
+    world.voxels().map(corner).collect()
 }
 
 #[cfg(test)]

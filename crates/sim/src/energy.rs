@@ -8,7 +8,7 @@
 //! part of the change is 0 up to rounding.
 
 use crate::lattice::{FAMILIES, spring_index};
-use crate::state::{Pair, X, Y};
+use crate::state::{Pair, State, X, Y};
 use crate::system::System;
 
 /// Energies put into a robot \[mass·wu²/s²\].
@@ -43,6 +43,8 @@ pub(crate) struct Meter {
     springs: Vec<Spring>,
     points: Vec<usize>,
     weight: f64,
+    /// Half of a point's mass.
+    half_mass: f64,
     /// Goals of the current control step; empty before the first (lengths then).
     goals: Vec<f64>,
     before: f64,
@@ -89,6 +91,7 @@ impl Meter {
             springs,
             points: lattice.points.iter().map(|&(point, _)| point).collect(),
             weight: physics.mass * physics.gravity,
+            half_mass: physics.mass / 2.0,
             goals: Vec::new(),
             before: 0.0,
             energy: Energy::default(),
@@ -103,9 +106,14 @@ impl Meter {
     /// Records new goals at the start of a control step.
     pub fn drive(&mut self, goals: &[f64], position: &Pair) {
         let before = self.potential(position);
+        self.set_goals(goals);
+        self.energy.drive += self.potential(position) - before;
+    }
+
+    /// Records the goals of the control step just completed.
+    pub fn set_goals(&mut self, goals: &[f64]) {
         self.goals.clear();
         self.goals.extend_from_slice(goals);
-        self.energy.drive += self.potential(position) - before;
     }
 
     /// Measures before the limits are applied.
@@ -119,6 +127,27 @@ impl Meter {
     }
 
     fn potential(&self, position: &Pair) -> f64 {
+        self.elastic(position) + self.gravitational(position)
+    }
+
+    pub fn gravitational(&self, position: &Pair) -> f64 {
+        let height: f64 = self.points.iter().map(|&point| position[Y][point]).sum();
+        self.weight * height
+    }
+
+    /// Returns the energy of the points' motion over the last substep.
+    pub fn kinetic(&self, state: &State, time_step: f64) -> f64 {
+        let speed = |point: usize, axis: usize| {
+            (state.position[axis][point] - state.previous[axis][point]) / time_step
+        };
+        let squares = self.points.iter().map(|&point| {
+            let [x, y] = [X, Y].map(|axis| speed(point, axis));
+            x * x + y * y
+        });
+        self.half_mass * squares.sum::<f64>()
+    }
+
+    pub fn elastic(&self, position: &Pair) -> f64 {
         let [x, y] = [&position[X], &position[Y]];
         let elastic = |spring: &Spring| {
             let [a, b] = spring.ends;
@@ -130,8 +159,7 @@ impl Meter {
             let excess = (dx * dx + dy * dy).sqrt() - goal;
             spring.half * excess * excess
         };
-        let height: f64 = self.points.iter().map(|&point| y[point]).sum();
-        self.springs.iter().map(elastic).sum::<f64>() + self.weight * height
+        self.springs.iter().map(elastic).sum()
     }
 }
 

@@ -73,6 +73,7 @@
 
 pub mod body;
 mod energy;
+mod gauge;
 pub mod grid;
 mod lattice;
 mod physics;
@@ -89,6 +90,7 @@ mod worlds;
 
 pub use body::{Body, Material};
 pub use energy::Energy;
+pub use gauge::{EnergyGauge, EnergyNow};
 pub use grid::Grid;
 pub use physics::{Physics, PhysicsError};
 pub use simd::{FloatEnvironment, InstructionSet};

@@ -183,6 +183,7 @@ mod tests {
         best: Some(1.0),
         coverage: 0.5,
         evaluations: 0,
+        qd_score: 0.0,
     };
 
     #[test]

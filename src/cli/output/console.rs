@@ -507,6 +507,7 @@ pub(super) mod tests {
                 best: None,
                 coverage: 0.5,
                 evaluations: 60,
+                qd_score: 1.5,
             },
         );
         console.event("list", &[1, 2]);

@@ -148,6 +148,7 @@ mod tests {
             best: None,
             coverage: 0.0,
             evaluations: 2000,
+            qd_score: 0.0,
         };
         let now = Generation {
             done: 150,

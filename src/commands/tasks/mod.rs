@@ -10,6 +10,7 @@ pub(crate) mod task;
 pub(crate) use all::{TasksSummary, check_data, run_all};
 pub(crate) use status::{TaskStatus, status};
 pub(crate) use steps::run;
+pub use task::Gaits;
 pub(crate) use task::{
-    AuditStep, EvalStep, Gaits, PairRun, Run, Steps, Task, TaskFolders, TrainRun, check_folders,
+    AuditStep, EvalStep, PairRun, Run, Steps, Task, TaskFolders, TrainRun, check_folders,
 };

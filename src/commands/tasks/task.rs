@@ -81,16 +81,17 @@ pub(crate) struct PairRun {
 
 /// Gaits of several runs, of which the best is trained for a task.
 #[derive(Clone, Debug)]
-pub(crate) struct Gaits {
+pub struct Gaits {
     /// The run.json files.
-    pub(crate) archives: Vec<PathBuf>,
+    pub archives: Vec<PathBuf>,
     /// Robots of each run whose gaits are tried.
-    pub(crate) robots: Selection,
-    pub(crate) groups: Groups,
+    pub robots: Selection,
+    /// The two groups of classes.
+    pub groups: Groups,
     /// Seed of all random numbers; `None`: that of each run.
-    pub(crate) seed: Option<u64>,
+    pub seed: Option<u64>,
     /// Keys that differ from those of the runs.
-    pub(crate) set: Vec<String>,
+    pub set: Vec<String>,
 }
 
 /// Steps of a pair before its rounds: the choice of the gait, and of the window.

@@ -57,7 +57,8 @@ impl Figure {
         self.size
     }
 
-    pub(crate) fn title(&self) -> &str {
+    /// Returns the title, for those who cannot see the figure.
+    pub fn title(&self) -> &str {
         &self.title
     }
 
@@ -144,12 +145,18 @@ impl Figure {
     }
 
     /// Returns the figure as PNG for print, with [`PRINT`] pixels per inch or as many as possible.
-    pub(crate) fn print(&self) -> Result<Vec<u8>, PictureError> {
+    ///
+    /// # Errors
+    /// Returns a [`PictureError`] if it cannot be encoded.
+    pub fn print(&self) -> Result<Vec<u8>, PictureError> {
         self.png(self.fitting(PRINT))
     }
 
     /// Returns the figure as PNG with `dpi` pixels per inch; the file states its intended size.
-    pub(crate) fn png(&self, dpi: u32) -> Result<Vec<u8>, PictureError> {
+    ///
+    /// # Errors
+    /// Returns a [`PictureError`] if it would have too many pixels, or cannot be encoded.
+    pub fn png(&self, dpi: u32) -> Result<Vec<u8>, PictureError> {
         let scale = f64::from(dpi) / 72.0;
         let [width, height] = self.size.map(|points| (points * scale).ceil());
         let possible = |pixels: f64| (1.0..=MOST_PIXELS).contains(&pixels);
