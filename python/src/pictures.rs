@@ -5,7 +5,8 @@ use crate::config::{ConfigData, setting};
 use crate::errors::{entered, raised, refused};
 use crate::watch::watched;
 use morphcog::base::error::Error;
-use morphcog::draw::gif::{self, GifOptions};
+use morphcog::draw::film::FilmOptions;
+use morphcog::draw::gif;
 use morphcog::draw::plot::Figure;
 use morphcog::draw::walk::Walk;
 use morphcog::draw::{html, raster};
@@ -82,6 +83,7 @@ impl RecordingData {
             Ok(LabelledStimulus {
                 class: 0,
                 label: format!("image {number}"),
+                image: None,
                 stimulus: seen(pixels, &body)
                     .map_err(|error| refused(format!("image {number}: {}", error.value(py))))?,
             })
@@ -142,7 +144,7 @@ impl RecordingData {
         every: usize,
         side_by_side: bool,
     ) -> PyResult<Bound<'py, PyBytes>> {
-        let mut options = GifOptions::default();
+        let mut options = FilmOptions::default();
         (options.width, options.every, options.side_by_side) = (width, every, side_by_side);
         let bytes = self.drawn(py, || Ok(gif::encode(&self.recording, &options)?))?;
         Ok(PyBytes::new(py, &bytes))

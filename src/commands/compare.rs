@@ -50,7 +50,7 @@ pub struct CompareOptions {
 #[derive(Clone, Debug)]
 pub struct ComparisonOutcome {
     pub(crate) comparison: Comparison,
-    /// The files written: the table, and the figure as SVG and PNG.
+    /// The files written: the table, and the figure as SVG, PNG and PDF.
     pub files: Vec<PathBuf>,
 }
 
@@ -97,21 +97,20 @@ pub fn compare(options: &CompareOptions, session: &Session) -> Result<Comparison
         })
         .collect();
     let comparison = comparison::compare(&subjects);
-    let figure = plot::comparison(&comparison);
-    let [csv, svg, png] = &files;
+    let figure = plot::comparison(&comparison, &Style::default());
     // Makes all files before writing any.
-    let picture = figure.print()?;
+    let drawn = FigureFormat::ALL.map(|format| figure.bytes(format));
+    let drawn: Vec<Vec<u8>> = drawn.into_iter().collect::<Result<_, _>>()?;
+    let (csv, figures) = files.split_first().expect("the table is the first file");
     write_atomically(csv, &to_csv(&comparison)).map_err(|error| Error::writing(csv, &error))?;
-    write_whole(svg, figure.svg().as_bytes())?;
-    write_whole(png, &picture)?;
-    Ok(ComparisonOutcome {
-        comparison,
-        files: files.to_vec(),
-    })
+    for (path, bytes) in figures.iter().zip(&drawn) {
+        write_whole(path, bytes)?;
+    }
+    Ok(ComparisonOutcome { comparison, files })
 }
 
-/// Returns the paths of the table and of the figure in both formats.
-fn files(options: &CompareOptions) -> Result<[PathBuf; 3], Error> {
+/// Returns the paths of the table, then of the figure in all formats.
+fn files(options: &CompareOptions) -> Result<Vec<PathBuf>, Error> {
     let csv = match &options.out {
         None => folder::beside_all(&options.archives, COMPARE_CSV),
         Some(out) => {
@@ -124,8 +123,8 @@ fn files(options: &CompareOptions) -> Result<[PathBuf; 3], Error> {
             out.clone()
         }
     };
-    let [svg, png] = ["svg", "png"].map(|ending| csv.with_extension(ending));
-    Ok([csv, svg, png])
+    let figures = FigureFormat::ALL.map(|format| csv.with_extension(format.ending()));
+    Ok([csv].into_iter().chain(figures).collect())
 }
 
 /// Reads the runs, two or more different ones with robots.

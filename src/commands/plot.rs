@@ -257,17 +257,17 @@ pub fn one(wanted: &PlotOptions, session: &Session) -> Result<Figure, Error> {
         FigureKind::Gates => {
             let source = StoredRun::read(path)?;
             let found = analysis::gates::walks(&source, session)?;
-            plot::gates(&found, &source.run.name)
+            plot::gates(&found, &source.run.name, &wanted.style)
         }
         FigureKind::Progress => {
             let run = RunFile::read(path)?;
             let line = Progress::of(&run, path)?;
             match line.moments.len() {
                 0 | 1 => return Err(too_short(path, &run, line.moments.len())),
-                _ => plot::progress(&[line]),
+                _ => plot::progress(&[line], &wanted.style),
             }
         }
-        kind => of_run(kind, path)?,
+        _ => of_run(wanted, path)?,
     };
     Ok(figure.on(wanted.background))
 }

@@ -18,20 +18,20 @@ const BATCH: usize = 32;
 
 /// Options of moving pictures.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct FilmOptions {
+pub struct FilmOptions {
     /// Width in pixels ([`stage::WIDTHS`](crate::draw::stage::WIDTHS)) of the picture, or of each
     /// side by side; the body gives the height.
-    pub(crate) width: u32,
+    pub width: u32,
     /// Frames per second, at most 50 (GIFs count hundredths of a second; viewers slow faster ones).
-    pub(crate) fps: f64,
+    pub fps: f64,
     /// The control steps from one frame to the next, at least 1. A second of the robot's time has
     /// 50 control steps, so 2 at 25 frames per second is real time.
-    pub(crate) every: usize,
+    pub every: usize,
     pub(crate) look: Look,
     /// The seconds for which the last frame of each phase stays.
     pub(crate) hold: f64,
     /// True if all rollouts are shown at once.
-    pub(crate) side_by_side: bool,
+    pub side_by_side: bool,
 }
 
 impl Default for FilmOptions {

@@ -7,7 +7,7 @@
 
 pub(crate) mod colour;
 pub(crate) mod error;
-pub(crate) mod film;
+pub mod film;
 pub(crate) mod fonts;
 pub mod gif;
 pub mod html;

@@ -268,6 +268,7 @@ pub fn moment(world: &World, body: &Body, stimulus: Grid<f64>) -> Recording {
         class: 0,
         label: "now".to_string(),
         stimulus,
+        image: None,
     };
     Recording {
         robot: String::new(),

@@ -5,10 +5,10 @@ use crate::base::number;
 use crate::body::Body;
 use crate::draw::colour;
 use crate::draw::colour::Colour;
-use crate::draw::fonts;
 use crate::draw::plot::axes::{AXIS, Axis, MARGIN, Plot, heading_in_lines, left_space};
 use crate::draw::plot::canvas::{Canvas, Pen, TEXT, TextStyle};
-use crate::draw::plot::figure::{Figure, PAGE};
+use crate::draw::plot::figure::Figure;
+use crate::draw::plot::style::Style;
 use crate::draw::plot::progress::pen;
 use crate::draw::plot::robot;
 use crate::store::metrics::Moment;
@@ -36,29 +36,29 @@ const SAMPLES: usize = 400;
 /// Plots runs side by side: the accuracies of their robots with 95 % intervals, the differences
 /// from the first run's robot on the same images, QD score and coverage over the generations, and
 /// the robots' bodies at one scale.
-pub(crate) fn comparison(found: &Comparison) -> Figure {
-    let mut canvas = Canvas::new();
+pub(crate) fn comparison(found: &Comparison, style: &Style) -> Figure {
+    let (mut canvas, page) = (Canvas::new(style), style.page());
     let names: Vec<&str> = found.runs.iter().map(|run| run.name.as_str()).collect();
     let of = names.join("; ");
-    let mut top = heading_in_lines(&mut canvas, "Comparison", &of, PAGE, 2) + 4.0;
+    let mut top = heading_in_lines(&mut canvas, "Comparison", &of, page, 2) + 4.0;
     if !found.accuracies.is_empty() {
-        top = accuracies(&mut canvas, found, top) + 8.0;
+        top = accuracies(&mut canvas, page, found, top) + 8.0;
     }
     if found.runs.iter().any(|run| run.curve.len() > 1) {
-        top = curves(&mut canvas, &found.runs, top) + 10.0;
+        top = curves(&mut canvas, page, &found.runs, top) + 10.0;
     }
-    top = bodies(&mut canvas, &found.runs, top);
+    top = bodies(&mut canvas, page, &found.runs, top);
     if !found.accuracies.is_empty() {
-        let at = [PAGE - MARGIN, top];
+        let at = [page - MARGIN, top];
         let note = "bars: 95 % intervals";
         canvas.text(at, note, TextStyle::end().colour(colour::FAINT));
     }
-    Figure::new(&format!("Comparison: {of}"), [PAGE, top + MARGIN], canvas)
+    Figure::new(&format!("Comparison: {of}"), [page, top + MARGIN], canvas)
 }
 
 /// Draws accuracies on the left, and differences from the first run on the right; returns the y
 /// below.
-fn accuracies(canvas: &mut Canvas, found: &Comparison, top: f64) -> f64 {
+fn accuracies(canvas: &mut Canvas, page: f64, found: &Comparison, top: f64) -> f64 {
     let all = &found.accuracies;
     let tasks: Vec<&str> = all.iter().map(|one| one.task.as_str()).collect();
     let is_of_tasks = tasks.iter().any(|task| *task != tasks[0]);
@@ -72,11 +72,11 @@ fn accuracies(canvas: &mut Canvas, found: &Comparison, top: f64) -> f64 {
     let labels: Vec<String> = all.iter().map(label).collect();
     let widest = labels
         .iter()
-        .map(|label| fonts::width(label, TEXT, false))
+        .map(|label| canvas.font().width(label, TEXT, false))
         .fold(0.0, f64::max)
         .min(NAMES);
     let left = MARGIN + widest + 14.0;
-    let width = (PAGE - MARGIN - LABEL - left - GAP) / 2.0;
+    let width = (page - MARGIN - LABEL - left - GAP) / 2.0;
     let height = LINE * all.len() as f64 + 4.0;
     let lowest = all.iter().map(|one| one.interval[0]).fold(0.9, f64::min);
     let is_paired = all.iter().any(|one| one.difference.is_some());
@@ -116,7 +116,7 @@ fn accuracies(canvas: &mut Canvas, found: &Comparison, top: f64) -> f64 {
         }
         let first = format!("accuracy less that of {} [points]", found.runs[0].name);
         let most = width + GAP;
-        plot.lower_axis(canvas, Some(&fonts::fitted(&first, TEXT, false, most)));
+        plot.lower_axis(canvas, Some(&canvas.font().fitted(&first, TEXT, false, most)));
     }
     top + height + AXIS
 }
@@ -152,7 +152,7 @@ fn interval(
 }
 
 /// Draws QD score and coverage over the generations; returns the y below.
-fn curves(canvas: &mut Canvas, runs: &[ComparedRun], top: f64) -> f64 {
+fn curves(canvas: &mut Canvas, page: f64, runs: &[ComparedRun], top: f64) -> f64 {
     type Quantity = (&'static str, fn(&Moment) -> f64);
     let quantities: [Quantity; 2] = [
         ("QD score", |moment| moment.qd_score),
@@ -161,12 +161,12 @@ fn curves(canvas: &mut Canvas, runs: &[ComparedRun], top: f64) -> f64 {
     let last = runs.iter().filter_map(|run| run.curve.last());
     let generations = last.map(|moment| (moment.generation + 1) as f64);
     let x = Axis::exact(0.0, generations.fold(1.0, f64::max), 4);
-    let half = (PAGE - 2.0 * MARGIN - GAP) / 2.0;
+    let half = (page - 2.0 * MARGIN - GAP) / 2.0;
     for (k, (name, of)) in quantities.into_iter().enumerate() {
         let values = || runs.iter().flat_map(|run| run.curve.iter().map(of));
         let (low, high) = (values().fold(0.0, f64::min), values().fold(0.0, f64::max));
         let y = Axis::nice(low, high, 4);
-        let space = left_space(y.labels_width());
+        let space = left_space(y.labels_width(canvas.font()));
         let left = MARGIN + k as f64 * (half + GAP) + space;
         let plot = Plot {
             at: [left, top],
@@ -193,7 +193,7 @@ fn curves(canvas: &mut Canvas, runs: &[ComparedRun], top: f64) -> f64 {
 }
 
 /// Draws the runs' robots at one scale, with the lines of the curves; returns the y below.
-fn bodies(canvas: &mut Canvas, runs: &[ComparedRun], top: f64) -> f64 {
+fn bodies(canvas: &mut Canvas, page: f64, runs: &[ComparedRun], top: f64) -> f64 {
     let all = || runs.iter().filter_map(|run| run.robot.as_ref());
     let sides = all().map(|robot| robot.body.height().max(robot.body.width()));
     let cell = BODY / sides.max().unwrap_or(1).max(1) as f64;
@@ -202,7 +202,7 @@ fn bodies(canvas: &mut Canvas, runs: &[ComparedRun], top: f64) -> f64 {
         rows.end - rows.start
     });
     let tallest = heights.max().unwrap_or(0);
-    let width = (PAGE - 2.0 * MARGIN) / BODIES as f64;
+    let width = (page - 2.0 * MARGIN) / BODIES as f64;
     let height = cell * tallest as f64 + CAPTION;
     for (number, run) in runs.iter().enumerate() {
         let left = MARGIN + width * (number % BODIES) as f64;
@@ -278,7 +278,7 @@ mod tests {
                     tests: Vec::new(),
                 })
                 .collect();
-            let svg = comparison(&compare(&subjects)).svg();
+            let svg = comparison(&compare(&subjects), &Style::default()).svg();
             roxmltree::Document::parse(&svg).unwrap();
             let last = format!(">run{}<", count - 1);
             assert!(svg.contains(&last) && !svg.contains("NaN"), "{count}");

@@ -8,6 +8,7 @@ use crate::base::number;
 use crate::base::number::percent;
 use crate::draw::html::escape;
 use crate::draw::plot;
+use crate::draw::plot::Style;
 use crate::draw::report::{figure, tables};
 
 /// A table for people.
@@ -219,6 +220,6 @@ pub(super) fn section(found: &Comparison) -> String {
     for line in remarks(found) {
         out += &format!("<p>{}.</p>\n", escape(&line));
     }
-    let figure = figure(&plot::comparison(found), "page");
+    let figure = figure(&plot::comparison(found, &Style::default()), "page");
     out + &format!("<div class=\"figures\">{figure}</div>\n</section>\n")
 }
