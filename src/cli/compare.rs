@@ -55,7 +55,7 @@ pub(super) struct CompareArgs {
     /// Folder with the images.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// The table (.csv); the figure goes beside it as SVG and PNG (default: compare.csv above the
+    /// The table (.csv); the figure goes beside it as SVG, PNG and PDF (default: compare.csv above the
     /// runs).
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,

@@ -11,11 +11,13 @@ use crate::commands::eval;
 use crate::commands::eval::EvalOptions;
 use crate::draw::error::write_whole;
 use crate::draw::plot;
+use crate::draw::plot::Style;
 use crate::robots;
 use crate::robots::selection::{BEST, Chosen, Selection};
 use crate::search::held_out_run::{CYCLES, task_of};
 use crate::store::eval::{EvalFile, RobotReport};
 use crate::store::folder;
+use crate::store::names::FigureFormat;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::run::{Robot, different};
 use crate::store::stored_run::StoredRun;
@@ -41,7 +43,7 @@ pub struct CompareOptions {
     pub dataset: Option<String>,
     /// Seed for drawing images, and robots with `random:1`.
     pub seed: u64,
-    /// Path of the table (CSV); `None`: compare.csv above the runs. The figure (SVG and PNG) goes
+    /// Path of the table (CSV); `None`: compare.csv above the runs. The figure (SVG, PNG and PDF) goes
     /// beside it.
     pub out: Option<PathBuf>,
 }
