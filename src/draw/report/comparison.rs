@@ -182,8 +182,9 @@ pub(crate) fn remarks(found: &Comparison) -> Vec<String> {
             _ => format!(", adjusted for {count} comparisons (Holm)"),
         };
         lines.push(format!(
-            "difference: percentage points from {} on the same images, with a 95 % bootstrap interval \
-             over the images; p: McNemar's exact test{adjusted}; from 0.05 on it is not significant",
+            "difference: percentage points from {} on the same images, with a 95 % bootstrap \
+             interval over the images; p: McNemar's exact test{adjusted}; from 0.05 on it is not \
+             significant",
             found.runs[0].name
         ));
         lines.push(
