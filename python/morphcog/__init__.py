@@ -62,6 +62,7 @@ __all__ = [
     "stimuli",
     "team",
     "train",
+    "train_pairs",
 ]
 
 _dataclass = _dataclasses.dataclass
@@ -761,6 +762,36 @@ def train(
             threads, progress, progress.waits,
         )
     return Run(folder)
+
+
+def train_pairs(
+    runs="gallery:gaits",
+    *,
+    classes=None,
+    dataset=None,
+    robots=None,
+    seed=None,
+    set=(),
+    out=None,
+    data=None,
+    threads=None,
+    quiet=False,
+):
+    """Trains a robot for each pair of classes, as `morphcog train --pairs`, and returns their Runs: a team.
+
+    runs: of the gaits, as of train. classes: names or numbers (default: all of the dataset). dataset: its name
+    (default: that of the gaits). robots: of each run (default: "top:5"). set: changes of keys; the others are
+    those of the team that ships. out: folder of all runs (default: runs/<dataset>-team). Ctrl-C keeps what is
+    done, and pairs that are done are not trained again: the same call goes on.
+    """
+    classes = None if classes is None else [str(name) for name in classes]
+    robots = None if robots is None else str(robots)
+    dataset, seed, threads = _path(dataset), _whole(seed, "seed", 0), _threads(threads)
+    with _Progress(quiet) as progress:
+        paths = _morphcog.train_pairs(
+            _archives(runs), robots, classes, dataset, seed, _changes(set), _path(out), _path(data), threads, progress
+        )
+    return [Run(path) for path in paths]
 
 
 @_dataclass(frozen=True, repr=False)

@@ -213,6 +213,19 @@ def train(
     quiet: bool = False,
     callback: _Callback | None = None,
 ) -> Run: ...
+def train_pairs(
+    runs: Run | _Path | Iterable[Run | _Path] = "gallery:gaits",
+    *,
+    classes: Iterable[str | int] | None = None,
+    dataset: str | None = None,
+    robots: str | None = None,
+    seed: int | None = None,
+    set: _Changes = (),
+    out: _Path | None = None,
+    data: _Path | None = None,
+    threads: int | None = None,
+    quiet: bool = False,
+) -> list[Run]: ...
 def team(
     runs: Run | _Path | Iterable[Run | _Path] = "gallery:team",
     *,

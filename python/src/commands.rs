@@ -5,7 +5,7 @@ use crate::errors::{entered, parsed, raised, refused};
 use crate::pictures::FigureData;
 use crate::run::written;
 use crate::watch::{Listener, heard};
-use morphcog::commands::pairs::{Gaits, best_gait};
+use morphcog::commands::pairs::{Gaits, PairsOptions, best_gait, pairs};
 use morphcog::commands::team::{self, TeamOptions};
 use morphcog::commands::train::{self, TrainOptions};
 use morphcog::commands::{audit, evolve};
@@ -137,6 +137,43 @@ pub(crate) fn train_run(
         };
         let audited = audit::audit(&options, session)?;
         audited.unwritten.map_or(Ok(out), Err)
+    })
+}
+
+/// Trains a robot for each pair of classes as `morphcog train --pairs` does; returns their run.json
+/// files.
+#[pyfunction]
+#[pyo3(signature = (archives, robots, classes, dataset, seed, set, out, data, threads, listener))]
+#[allow(clippy::too_many_arguments)] // Python's keywords
+pub(crate) fn train_pairs(
+    py: Python,
+    archives: Vec<PathBuf>,
+    robots: Option<&str>,
+    classes: Option<Vec<String>>,
+    dataset: Option<String>,
+    seed: Option<u64>,
+    set: Vec<String>,
+    out: Option<PathBuf>,
+    data: Option<PathBuf>,
+    threads: Option<usize>,
+    listener: &Bound<PyAny>,
+) -> PyResult<Vec<PathBuf>> {
+    let _environment = entered()?;
+    let robots = robots.map(|robots| parsed("robots", robots)).transpose()?;
+    let options = PairsOptions {
+        archives,
+        robots: robots.unwrap_or(Selection::Top(train::GAITS[1])),
+        dataset,
+        classes,
+        seed,
+        set,
+    };
+    let listener = Listener {
+        function: listener,
+        waits: false,
+    };
+    heard(py, &listener, (threads, data), |session| {
+        pairs(&options, out, session)
     })
 }
 

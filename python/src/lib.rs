@@ -43,6 +43,7 @@ fn _morphcog(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<world::WorldData>()?;
     module.add_function(wrap_pyfunction!(commands::evolve_run, module)?)?;
     module.add_function(wrap_pyfunction!(commands::train_run, module)?)?;
+    module.add_function(wrap_pyfunction!(commands::train_pairs, module)?)?;
     module.add_function(wrap_pyfunction!(commands::team_test, module)?)?;
     module.add_function(wrap_pyfunction!(datasets::images, module)?)?;
     module.add_function(wrap_pyfunction!(datasets::import_dataset, module)?)?;

@@ -785,6 +785,18 @@ def test_a_gait_is_trained_measured_and_tested_as_a_team(run, tmp_path, monkeypa
     assert repr(team).startswith("Team(1 robots, 20 images, accuracy=")
 
 
+def test_pairs_are_trained_once_and_answer_as_a_team(tmp_path):
+    few = {key: value for key, value in FEW.items() if not key.startswith("data.")} | {"train.windows": 0}
+    gaits = {"data.dataset": "builtin", "body": {"height": 5, "width": 5}, "protocol.control_steps": 50, "validation.best": 0}
+    gaits = mc.evolve("gaits.toml", generations=2, set=gaits, quiet=True, out=tmp_path / "gaits")
+    options = {"classes": [0, 1, 2], "robots": "top:1", "set": few, "out": tmp_path / "team", "quiet": True}
+    runs = mc.train_pairs(gaits, **options)
+    assert [run["best"].task for run in runs] == ["0|1", "0|2", "1|2"]
+    before = [run.path.stat().st_mtime_ns for run in runs]
+    assert [run.path.stat().st_mtime_ns for run in mc.train_pairs(gaits, **options)] == before
+    assert len(mc.team(runs, classes=[0, 1, 2], images=30, quiet=True).members) == 3
+
+
 def test_ctrl_c_ends_rollouts():
     code = """
 import signal, time, numpy as np, morphcog as mc

@@ -6,7 +6,7 @@ use crate::base::shell::quoted;
 use crate::cli::in_session;
 use crate::cli::output::console::Console;
 use crate::cli::output::networks;
-use crate::cli::tasks::{Command, TaskRequest, TaskResources, ended, handle_request};
+use crate::cli::tasks::{Command, TaskRequest, TaskResources, handle_request};
 use crate::cli::values::decimal;
 use crate::commands::plan::{PAPER_TOML, PaperPlan};
 use crate::commands::reproduce;
@@ -100,7 +100,7 @@ pub(super) fn run(args: ReproduceArgs, console: &Console) -> Result<(), Error> {
     let finished = in_session(console, args.place.with(), |session| {
         reproduce::reproduce(&options, session)
     })?;
-    ended(&finished.runs, tasks.len())?;
+    finished.runs.check(tasks.len())?;
     if finished.stopped {
         let text = "stopped; what is done so far is kept".to_string();
         return Err(Error::stopped(text).remedy(Remedy::Repeat));

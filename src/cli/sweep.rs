@@ -7,7 +7,7 @@ use crate::cli::in_session;
 use crate::cli::output::console::Console;
 use crate::cli::output::sweeps;
 use crate::cli::tasks::{
-    Command, TaskRequest, TaskResources, ended, handle_request, refused, warn_of_gaits,
+    Command, TaskRequest, TaskResources, handle_request, refused, warn_of_gaits,
 };
 use crate::commands::sweep::SweepPlan;
 use crate::commands::tasks::TaskFolders;
@@ -116,7 +116,7 @@ pub(super) fn run(args: SweepArgs, console: &Console) -> Result<(), Error> {
     let summary = in_session(console, args.place.with(), |session| {
         tasks::run_all(&tasks, &place, jobs, session)
     })?;
-    ended(&summary, tasks.len())?;
+    summary.check(tasks.len())?;
     console.line(&format!(
         "{} done, in {}",
         counted(tasks.len(), "task is", "tasks are"),

@@ -1,7 +1,6 @@
 //! Options that `sweep` and `reproduce` share: to run one task or all, list them or show progress.
 
 use crate::base::error::Error;
-use crate::base::remedy::Remedy;
 use crate::base::shell::{in_shell, quoted};
 use crate::cli::output::console::Console;
 use crate::cli::output::sweeps;
@@ -9,7 +8,7 @@ use crate::cli::values::{MOST, threads, whole};
 use crate::cli::{Resources, in_session};
 use crate::cli::{choice, process};
 use crate::commands::tasks;
-use crate::commands::tasks::{Run, Task, TaskFolders, TasksSummary};
+use crate::commands::tasks::{Run, Task, TaskFolders};
 use crate::shipped::atlas;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -279,36 +278,4 @@ fn from_engine(option: &str) -> Result<usize, Error> {
         .trim()
         .parse()
         .map_err(|_| Error::usage(format!("{name}={value}: expected the number of a task")))
-}
-
-/// Reports how all tasks ended.
-pub(super) fn ended(summary: &TasksSummary, count: usize) -> Result<(), Error> {
-    let TasksSummary {
-        done,
-        failed,
-        elsewhere,
-        open,
-    } = summary;
-    if !failed.is_empty() {
-        let numbers: Vec<String> = failed.iter().map(usize::to_string).collect();
-        let (count_failed, numbers) = (failed.len(), numbers.join(", "));
-        let text = format!(
-            "{count_failed} of {count} tasks failed: {numbers}; {done} are done, {open} are open"
-        );
-        return Err(Error::other(text).advice("the same command tries them again"));
-    }
-    if *open == 0 && *elsewhere > 0 {
-        let text = format!("{done} of {count} tasks are done; other processes are at {elsewhere}");
-        return Err(Error::occupied(text).advice("the same command does what they leave"));
-    }
-    if *open > 0 {
-        let at = if *elsewhere > 0 {
-            format!(", {elsewhere} in the hands of other processes")
-        } else {
-            String::new()
-        };
-        let text = format!("stopped; {done} of {count} tasks are done{at}");
-        return Err(Error::stopped(text).remedy(Remedy::Repeat));
-    }
-    Ok(())
 }

@@ -9,7 +9,7 @@ use crate::cli::choice::{Archives, ROBOTS, selected};
 use crate::cli::output::console::Console;
 use crate::cli::output::{summary, verdicts};
 use crate::cli::tasks::{
-    Command, TaskRequest, TaskResources, ended, handle_request, refused, warn_of_gaits,
+    Command, TaskRequest, TaskResources, handle_request, refused, warn_of_gaits,
 };
 use crate::cli::values::{MOST, seed, threads, whole};
 use crate::cli::{Resources, in_session};
@@ -264,13 +264,9 @@ fn pairs(args: TrainArgs, console: &Console) -> Result<(), Error> {
     }
     tasks::check_folders(&tasks, &place).map_err(|errors| refused(errors, console))?;
     warn_of_gaits(&tasks, console);
-    let summary = in_session(console, with.with(), |session| {
-        if let Some(Run::Pair(pair)) = tasks.first().map(|task| &task.run) {
-            pairs::measure(&pair.gaits, session)?;
-        }
-        tasks::run_all(&tasks, &place, jobs.map(usize::from), session)
+    in_session(console, with.with(), |session| {
+        pairs::train_all(&tasks, &place, jobs.map(usize::from), session)
     })?;
-    ended(&summary, tasks.len())?;
     summary::pairs(console, &tasks, &place)?;
     console.suggest(
         "next:",

@@ -13,7 +13,9 @@ use crate::base::table;
 use crate::commands::audit;
 use crate::commands::response::{self, ResponseOptions};
 pub use crate::commands::tasks::Gaits;
-use crate::commands::tasks::{AuditStep, PairRun, Run, Steps, Task, TaskFolders};
+use crate::commands::tasks::{
+    AuditStep, PairRun, Run, Steps, Task, TaskFolders, check_folders, run_all,
+};
 use crate::commands::train::{self, TrainOptions};
 use crate::config::Config;
 use crate::config::audit::Criteria;
@@ -24,7 +26,7 @@ use crate::response::probing::{Probing, response as response_of};
 use crate::robots;
 use crate::robots::selection::Selection;
 use crate::store::audit::{AuditFile, RobotAudit};
-use crate::store::folder::{IfExists, RunFolder, beside, name};
+use crate::store::folder::{IfExists, RUNS, RunFolder, beside, name};
 use crate::store::names::{AUDIT_JSON, RESPONSE_JSON, RUN_JSON, TRAINING_JSON, VALIDATION_JSON};
 use crate::store::run::different;
 use crate::store::stored_run::StoredRun;
@@ -65,19 +67,55 @@ const GAITS_CSV: &str = "gaits.csv";
 
 /// The gaits and the classes of a team.
 #[derive(Clone, Debug)]
-pub(crate) struct PairsOptions {
+pub struct PairsOptions {
     /// The runs of the gaits.
-    pub(crate) archives: Vec<PathBuf>,
+    pub archives: Vec<PathBuf>,
     /// Robots of each run whose gaits are tried.
-    pub(crate) robots: Selection,
+    pub robots: Selection,
     /// The dataset; `None`: that of the gaits.
-    pub(crate) dataset: Option<String>,
+    pub dataset: Option<String>,
     /// Names or numbers of classes; `None`: all of the dataset.
-    pub(crate) classes: Option<Vec<String>>,
+    pub classes: Option<Vec<String>>,
     /// Seed of all random numbers; `None`: that of the gaits' run.
-    pub(crate) seed: Option<u64>,
+    pub seed: Option<u64>,
     /// Config keys, as `train.rounds=10`.
-    pub(crate) set: Vec<String>,
+    pub set: Vec<String>,
+}
+
+/// Trains a robot for each pair of classes, each in a folder of its own in `out`, and returns their
+/// run.json files. Pairs that are done are kept: the same call goes on.
+///
+/// # Errors
+/// Returns an error if an option, a run, the data or a folder is unsuitable, a pair failed, or it was
+/// stopped.
+pub fn pairs(
+    options: &PairsOptions,
+    out: Option<PathBuf>,
+    session: &Session,
+) -> Result<Vec<PathBuf>, Error> {
+    let out = match out {
+        Some(out) => out,
+        None => Path::new(RUNS).join(format!("{}-team", options.dataset_name()?)),
+    };
+    let tasks = options.tasks(session.data_folder())?;
+    let place = TaskFolders { out };
+    check_folders(&tasks, &place).map_err(|mut errors| errors.swap_remove(0))?;
+    train_all(&tasks, &place, None, session)?;
+    let run = |task| place.folder(task).join(RUN_JSON);
+    Ok(tasks.iter().map(run).collect())
+}
+
+/// Trains all pairs, `jobs` at once; `None`: one per core.
+pub(crate) fn train_all(
+    tasks: &[Task],
+    place: &TaskFolders,
+    jobs: Option<usize>,
+    session: &Session,
+) -> Result<(), Error> {
+    if let Some(Run::Pair(pair)) = tasks.first().map(|task| &task.run) {
+        measure(&pair.gaits, session)?;
+    }
+    run_all(tasks, place, jobs, session)?.check(tasks.len())
 }
 
 impl PairsOptions {

@@ -2,6 +2,7 @@
 
 use crate::base::error::{Error, ErrorKind};
 use crate::base::observer::{Generation, Observer, Work};
+use crate::base::remedy::Remedy;
 use crate::base::session::Session;
 use crate::base::text::counted;
 use crate::base::threads;
@@ -34,6 +35,41 @@ pub(crate) struct TasksSummary {
     pub(crate) elsewhere: usize,
     /// Number of tasks that were stopped or did not begin.
     pub(crate) open: usize,
+}
+
+impl TasksSummary {
+    /// Returns an error if not all of `count` tasks are done.
+    pub(crate) fn check(&self, count: usize) -> Result<(), Error> {
+        let TasksSummary {
+            done,
+            failed,
+            elsewhere,
+            open,
+        } = self;
+        if !failed.is_empty() {
+            let numbers: Vec<String> = failed.iter().map(usize::to_string).collect();
+            let (count_failed, numbers) = (failed.len(), numbers.join(", "));
+            let text = format!(
+                "{count_failed} of {count} tasks failed: {numbers}; {done} are done, {open} are open"
+            );
+            return Err(Error::other(text).advice("the same command tries them again"));
+        }
+        if *open == 0 && *elsewhere > 0 {
+            let text =
+                format!("{done} of {count} tasks are done; other processes are at {elsewhere}");
+            return Err(Error::occupied(text).advice("the same command does what they leave"));
+        }
+        if *open > 0 {
+            let at = if *elsewhere > 0 {
+                format!(", {elsewhere} in the hands of other processes")
+            } else {
+                String::new()
+            };
+            let text = format!("stopped; {done} of {count} tasks are done{at}");
+            return Err(Error::stopped(text).remedy(Remedy::Repeat));
+        }
+        Ok(())
+    }
 }
 
 /// Checks that tasks that have not begun have images, also for their tests. Otherwise they would
