@@ -514,7 +514,7 @@ class Robot:
         """A page for a browser in which it walks under its training images, as HTML."""
         return self.recording()._data.page()
 
-    def gif(self, path, *, width=480, every=1, side_by_side=False):
+    def gif(self, path, *, width=480, every=2, side_by_side=False):
         """Writes an animation of it under its training images, and returns the path; as Recording.save."""
         path = _path(path)
         if not path.lower().endswith(".gif"):
@@ -586,15 +586,19 @@ class Run:
             raise Error(f"{path}: there are no metrics of this run; runs that ship with morphcog have none")
         return _table_in(path)
 
-    def plot(self, kind="archive", robot=None, *, every=None, transparent=False, data=None):
+    def plot(
+        self, kind="archive", robot=None, *, every=None, width=None, title=True, transparent=False, data=None
+    ):
         """A Figure, as `morphcog plot` makes it.
 
         kind: of the run, "archive", "progress", "accuracy" (of its evaluation), "capacity" or "gates"; of a robot,
         "body", "spacetime" or "snapshots". robot: its id, the beginning of that, or "best" (default). every:
-        control steps between the poses of snapshots (default: fits the walk).
+        control steps between the poses of snapshots (default: fits the walk). width: in millimetres, 60 to 1000
+        (default: a journal's column or page); letters keep their size.
         """
         every = _whole(every, "every", 1) or 0
-        return Figure(self._data.figure(str(kind), robot, every, bool(transparent), _path(data)))
+        style = (_whole(width, "width", 60, 1000), bool(title), bool(transparent))
+        return Figure(self._data.figure(str(kind), robot, every, style, _path(data)))
 
     def response(
         self, robots="best", *, task=None, set=(), images=1000, error=0.2, seed=None, data=None, quiet=False

@@ -39,7 +39,7 @@ class Recording:
     @property
     def displacements(self) -> list[float]: ...
     def save(
-        self, path: _Path, *, width: int = 480, every: int = 1, side_by_side: bool = False
+        self, path: _Path, *, width: int = 480, every: int = 2, side_by_side: bool = False
     ) -> pathlib.Path: ...
     def _repr_html_(self) -> str: ...
 
@@ -73,7 +73,7 @@ class Robot:
     def recording(self) -> Recording: ...
     def page(self) -> str: ...
     def gif(
-        self, path: _Path, *, width: int = 480, every: int = 1, side_by_side: bool = False
+        self, path: _Path, *, width: int = 480, every: int = 2, side_by_side: bool = False
     ) -> pathlib.Path: ...
     def plot(
         self, kind: Literal["body", "spacetime", "snapshots"] = "body", **options: Any
@@ -101,6 +101,8 @@ class Run:
         robot: str | None = None,
         *,
         every: int | None = None,
+        width: int | None = None,
+        title: bool = True,
         transparent: bool = False,
         data: _Path | None = None,
     ) -> Figure: ...

@@ -15,16 +15,18 @@ class Figure:
         self._data = data
 
     def save(self, path, dpi=None):
-        """Writes the figure; the ending of the name says as what: .svg or .png. dpi: pixels of a PNG per inch
-        (default: 300, as for print). Returns the path."""
+        """Writes the figure; the ending of the name says as what: .svg, .png or .pdf. dpi: pixels of a PNG per
+        inch (default: 300, as for print). Returns the path."""
         path, dpi = pathlib.Path(_path(path)), _whole(dpi, "dpi", 36, 2400)
         ending = path.suffix.lower()
         if ending == ".svg":
-            path.write_text(self._data.svg(), encoding="utf-8")
+            path.write_text(self._data.svg_file(), encoding="utf-8")
         elif ending == ".png":
             path.write_bytes(self._data.png(dpi))
+        elif ending == ".pdf":
+            path.write_bytes(self._data.pdf())
         else:
-            raise Error(f"path={path}: expected a name that ends in .svg or .png")
+            raise Error(f"path={path}: expected a name that ends in .svg, .png or .pdf")
         return path
 
     def _repr_svg_(self):
@@ -46,9 +48,9 @@ class Recording:
         """How far it walked under each image, in voxel lengths; fewer if it became unstable."""
         return self._data.displacements
 
-    def save(self, path, *, width=480, every=1, side_by_side=False):
+    def save(self, path, *, width=480, every=2, side_by_side=False):
         """Writes it; the ending of the name says as what: a page (.html), an animation (.gif) or its last moment
-        (.png). Of animations, width: pixels; every: control steps from one frame to the next; side_by_side: all
+        (.png). Of animations, width: pixels; every: control steps from one frame to the next (2: in real time); side_by_side: all
         images at once. Returns the path."""
         path = pathlib.Path(_path(path))
         width, every = _whole(width, "width", 1, 2**32 - 1), _whole(every, "every", 1)

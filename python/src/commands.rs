@@ -10,7 +10,7 @@ use morphcog::commands::team::{self, TeamOptions};
 use morphcog::commands::train::{self, TrainOptions};
 use morphcog::commands::{audit, evolve};
 use morphcog::config::audit::Criteria;
-use morphcog::draw::plot::{confusion, poster};
+use morphcog::draw::plot::{Style, confusion, poster};
 use morphcog::robots::selection::Selection;
 use morphcog::store::folder::{self, IfExists};
 use morphcog::store::images::HeldOut;
@@ -215,8 +215,8 @@ pub(crate) fn team_test(
     let tested = heard(py, &listener, (threads, data), |session| {
         team::team(&options, session)
     })?;
-    let figure = |figure| FigureData { figure };
-    let figures = [confusion(&tested.file), poster(&tested.file)];
+    let (figure, style) = (|figure| FigureData { figure }, Style::default());
+    let figures = [confusion(&tested.file, &style), poster(&tested.file, &style)];
     let [confusion, bodies] = figures.map(|drawn| drawn.map(figure));
     let path = written(tested.unwritten, &options.out)?;
     Ok((path, confusion, bodies))

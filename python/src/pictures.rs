@@ -37,6 +37,16 @@ impl FigureData {
         self.figure.svg()
     }
 
+    /// Returns the text of an SVG file, whose words look the same everywhere.
+    fn svg_file(&self) -> String {
+        self.figure.outlined_svg()
+    }
+
+    fn pdf<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = self.figure.pdf().map_err(|error| raised(&error.into()))?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
     /// Returns the bytes of a PNG with so many pixels per inch, or as for print.
     #[pyo3(signature = (dpi))]
     fn png<'py>(&self, py: Python<'py>, dpi: Option<u32>) -> PyResult<Bound<'py, PyBytes>> {

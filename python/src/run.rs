@@ -14,7 +14,7 @@ use morphcog::commands::plot::{self, FigureKind, PlotOptions};
 use morphcog::commands::response::{self, ResponseOptions};
 use morphcog::commands::{audit, eval, replay};
 use morphcog::config::audit::Criteria;
-use morphcog::draw::plot::Background;
+use morphcog::draw::plot::{Background, Style};
 use morphcog::robots;
 use morphcog::robots::selection::Selection;
 use morphcog::search::held_out_run;
@@ -168,7 +168,7 @@ impl RunData {
         kind: &str,
         robot: Option<String>,
         every: usize,
-        transparent: bool,
+        style: (Option<u32>, bool, bool),
         data: Option<PathBuf>,
     ) -> PyResult<FigureData> {
         let _environment = entered()?;
@@ -186,8 +186,14 @@ impl RunData {
                 )));
             }
         };
+        let (width, has_title, transparent) = style;
+        let style = Style::default().millimetres(width);
         let wanted = PlotOptions {
             kind,
+            style: match has_title {
+                true => style,
+                false => style.without_title(),
+            },
             archives: vec![self.place.clone()],
             robots,
             options: replay::ReplayOptions {

@@ -73,7 +73,10 @@ impl Figure {
     }
 
     /// Returns the figure as PDF: one page of its size, with the fonts that it uses.
-    pub(crate) fn pdf(&self) -> Result<Vec<u8>, PictureError> {
+    ///
+    /// # Errors
+    /// Returns a [`PictureError`] if a font cannot be embedded.
+    pub fn pdf(&self) -> Result<Vec<u8>, PictureError> {
         let paper = (self.background == Background::Paper).then_some(colour::PAPER);
         self.content.pdf(&self.title, self.size, paper)
     }

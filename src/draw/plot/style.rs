@@ -37,14 +37,14 @@ impl Default for Style {
 impl Style {
     /// Gives the figure a width in millimetres.
     #[must_use]
-    pub(crate) fn millimetres(self, width: Option<u32>) -> Self {
+    pub fn millimetres(self, width: Option<u32>) -> Self {
         let width = width.map(|width| f64::from(width) * POINTS);
         Style { width, ..self }
     }
 
     /// Leaves out the title and the line below it.
     #[must_use]
-    pub(crate) fn without_title(self) -> Self {
+    pub fn without_title(self) -> Self {
         Style {
             has_title: false,
             ..self
