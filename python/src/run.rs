@@ -161,7 +161,7 @@ impl RunData {
     }
 
     /// Draws a figure of the run, or of one of its robots.
-    #[pyo3(signature = (kind, robot, every, transparent, data))]
+    #[pyo3(signature = (kind, robot, every, style, data))]
     fn figure(
         &self,
         py: Python,
