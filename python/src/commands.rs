@@ -216,7 +216,10 @@ pub(crate) fn team_test(
         team::team(&options, session)
     })?;
     let (figure, style) = (|figure| FigureData { figure }, Style::default());
-    let figures = [confusion(&tested.file, &style), poster(&tested.file, &style)];
+    let figures = [
+        confusion(&tested.file, &style),
+        poster(&tested.file, &style),
+    ];
     let [confusion, bodies] = figures.map(|drawn| drawn.map(figure));
     let path = written(tested.unwritten, &options.out)?;
     Ok((path, confusion, bodies))

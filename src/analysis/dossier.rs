@@ -150,7 +150,7 @@ pub(crate) fn gather(
     }
     let named: Vec<(String, u64)> = runs
         .iter()
-        .map(|dossier| (dossier.run.name.clone(), dossier.run.config.seed))
+        .map(|dossier| (dossier.run.called().to_string(), dossier.run.config.seed))
         .collect();
     let count = |name: &(String, u64), among: &[(String, u64)]| {
         among.iter().filter(|other| *other == name).count()

@@ -111,7 +111,7 @@ impl Progress {
         let mut settings = run.config.settings();
         settings.remove("seed");
         Ok(Progress {
-            run: run.name.clone(),
+            run: run.called().to_string(),
             seed: run.config.seed,
             unit,
             moments,

@@ -255,7 +255,12 @@ fn open(options: &AuditOptions, session: &Session) -> Result<Opened, Error> {
         }
     }
     let order: Vec<String> = run.elites.iter().map(|robot| robot.id.clone()).collect();
-    let file = AuditFile::new(&run.name, run.fingerprint(), order.len(), &options.criteria);
+    let file = AuditFile::new(
+        run.called(),
+        run.fingerprint(),
+        order.len(),
+        &options.criteria,
+    );
     let (config, fitness) = (run.config.clone(), run.fitness());
     Ok(Opened {
         config,

@@ -204,7 +204,7 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
         for path in &archives {
             let source = StoredRun::read(path)?;
             let found = analysis::gates::walks(&source, session)?;
-            let figure = plot::gates(&found, &source.run.name, &wanted.style);
+            let figure = plot::gates(&found, source.run.called(), &wanted.style);
             let stem = stem(path, wanted.kind, "");
             write(Made { figure, stem })?;
             gates.extend(found);
@@ -257,7 +257,7 @@ pub fn one(wanted: &PlotOptions, session: &Session) -> Result<Figure, Error> {
         FigureKind::Gates => {
             let source = StoredRun::read(path)?;
             let found = analysis::gates::walks(&source, session)?;
-            plot::gates(&found, &source.run.name, &wanted.style)
+            plot::gates(&found, source.run.called(), &wanted.style)
         }
         FigureKind::Progress => {
             let run = RunFile::read(path)?;
@@ -457,7 +457,7 @@ fn of_run(wanted: &PlotOptions, path: &Path) -> Result<Figure, Error> {
                 let is_of_it = match exists(&eval) {
                     // The runs of its robots.
                     true => file.is_of(&EvalFile::of_runs(&eval, &[&run])?),
-                    false => file.run == run.name,
+                    false => [&run.name, run.called()].contains(&file.run.as_str()),
                 };
                 if !is_of_it {
                     let text = format!(

@@ -313,7 +313,7 @@ pub fn find(options: &ReplayOptions) -> Result<FoundRobot, Error> {
         ("Robot".to_string(), robot.id.clone()),
         (
             "From".to_string(),
-            published::provenance(&run.name, run.config.seed),
+            published::provenance(run.called(), run.config.seed),
         ),
         ("Task".to_string(), robot.task.clone()),
         ("Fitness".to_string(), run.in_units(robot.objective)),

@@ -302,7 +302,7 @@ fn provenance(options: &ResponseOptions) -> Result<Provenance, Error> {
     let run = &source.run;
     Ok(Provenance {
         config: run.config.clone(),
-        run: run.name.clone(),
+        run: run.called().to_string(),
         sha256,
         dataset: run.dataset.clone(),
         robots,

@@ -515,7 +515,7 @@ fn of_run(run: RunFile, audit: Option<&AuditFile>) -> Result<Collection, Error> 
     // A training has one robot, and no archive.
     let map = run.origin.is_none().then(|| CellMap::of(&run));
     Ok(Collection {
-        name: format!("{}, seed {}", run.name, run.config.seed),
+        name: format!("{}, seed {}", run.called(), run.config.seed),
         path: None,
         generations: Some(run.generations),
         map,

@@ -303,7 +303,7 @@ impl EvalFile {
             format: FORMAT.to_string(),
             format_version: FORMAT_VERSION,
             program_version: env!("CARGO_PKG_VERSION").to_string(),
-            run: first.map_or(String::new(), |run| run.name.clone()),
+            run: first.map_or(String::new(), |run| run.called().to_string()),
             run_seed: first.map_or(0, |run| run.config.seed),
             runs: RunRef::of_all(sources),
             setting: first.map(|run| RunSetting {

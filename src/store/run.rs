@@ -11,6 +11,7 @@ use crate::config::Config;
 use crate::genome::Genome;
 use crate::qd::descriptor::{count_bin, possible_cells};
 use crate::qd::{Archive, ArchiveStats, DescriptorSpace, Elite};
+use crate::shipped;
 use crate::shipped::read_text;
 use crate::store::images::{DatasetRef, ImageRef, answers};
 use crate::store::results::{self, Stored, by_lines};
@@ -141,6 +142,9 @@ pub struct RunFile {
     /// The SHA-256 of the bytes of the file; `None` if the run was not read from its file.
     #[serde(skip)]
     pub read_sha256: Option<String>,
+    /// The name of the folder that the file was read from, or of a run that ships.
+    #[serde(skip)]
+    pub(crate) folder: Option<String>,
 }
 
 impl Stored for RunFile {
@@ -232,6 +236,20 @@ impl Stored for RunFile {
     }
 }
 
+/// Returns the name of a run's folder, or of a run that ships; `None` if neither has a name.
+fn folder_of(path: &Path) -> Option<String> {
+    if let Some((of, run)) = shipped::name(path) {
+        return Some(format!("{of}:{run}"));
+    }
+    let parent = path.parent()?;
+    // In the present folder, only its absolute path has a name.
+    let name = match parent.file_name() {
+        Some(name) => name.to_os_string(),
+        None => parent.canonicalize().ok()?.file_name()?.to_os_string(),
+    };
+    Some(name.to_string_lossy().into_owned())
+}
+
 impl RunFile {
     /// Creates a run of this program from its archive after some generations.
     pub(crate) fn new(
@@ -259,6 +277,7 @@ impl RunFile {
                 .map(|elite| elite.solution.clone())
                 .collect(),
             read_sha256: None,
+            folder: None,
         })
     }
 
@@ -302,8 +321,23 @@ impl RunFile {
         let run: RunFile = results::parse(text, name)?;
         Ok(RunFile {
             read_sha256: Some(sha256_hex(text.as_bytes())),
+            folder: folder_of(Path::new(name)),
             ..run
         })
+    }
+
+    /// Returns the name of the run for people: its folder's, or that of a run that ships, without
+    /// the seed at its end; its config's if it was not read from a file.
+    pub(crate) fn called(&self) -> &str {
+        let Some(folder) = &self.folder else {
+            return &self.name;
+        };
+        let seed = self.config.seed;
+        let ends = [format!("-seed{seed}"), format!("-{seed}")];
+        let stem = ends
+            .iter()
+            .find_map(|end| folder.strip_suffix(end.as_str()));
+        stem.filter(|stem| !stem.is_empty()).unwrap_or(folder)
     }
 
     fn space(&self) -> DescriptorSpace {

@@ -2,15 +2,15 @@
 
 use crate::base::number;
 use crate::body::Material;
+use crate::draw::colour;
 use crate::draw::colour::Colour;
+use crate::draw::fonts::Font;
 use crate::draw::plot::axes::{Axis, MARGIN, colour_bar, heading};
 use crate::draw::plot::canvas::{Canvas, Pen, Piece, TEXT, TextStyle};
 use crate::draw::plot::cells::{Cell, CellMap, Panel, TaskMap, colour as colour_of};
 use crate::draw::plot::figure::Figure;
 use crate::draw::plot::style::Style;
 use crate::draw::plot::{robot, scales};
-use crate::draw::colour;
-use crate::draw::fonts::Font;
 use crate::store::run::RunFile;
 use std::collections::BTreeMap;
 
@@ -37,7 +37,7 @@ pub fn archive(run: &RunFile, style: &Style) -> Figure {
     };
     let of = format!(
         "{}, seed {}, generation {}; {} of {} cells",
-        run.name,
+        run.called(),
         run.config.seed,
         run.generations,
         run.stats.num_elites,
@@ -224,7 +224,10 @@ impl Layout {
             }
         }
         // A name that is longer than its axis begins with it.
-        let names = [x + wide / 2.0, x + 0.5 * canvas.font().width(MUSCLES, TEXT, false)];
+        let names = [
+            x + wide / 2.0,
+            x + 0.5 * canvas.font().width(MUSCLES, TEXT, false),
+        ];
         let at = [names[0].min(names[1]), y + 18.0];
         canvas.text(at, MUSCLES, TextStyle::middle());
         let upwards = TextStyle {
@@ -277,7 +280,14 @@ fn legend(canvas: &mut Canvas, [x, y]: [f64; 2], map: &CellMap) {
     let axis = Axis::exact(0.0, if highest > 0.0 { highest } else { 1.0 }, 5);
     let colour = |value| colour_of(value, axis.to);
     let wide = LEGEND[0] - 6.0;
-    let lower = colour_bar(canvas, [x, y + 7.0], [wide, LEGEND[0]], &axis, &name, colour);
+    let lower = colour_bar(
+        canvas,
+        [x, y + 7.0],
+        [wide, LEGEND[0]],
+        &axis,
+        &name,
+        colour,
+    );
     let mut top = y + lower + 30.0;
     let mut line = |canvas: &mut Canvas, fill: Colour, text: &str| {
         let at = [x, top];

@@ -8,9 +8,9 @@ use crate::draw::colour::Colour;
 use crate::draw::plot::axes::{AXIS, Axis, MARGIN, Plot, heading_in_lines, left_space};
 use crate::draw::plot::canvas::{Canvas, Pen, TEXT, TextStyle};
 use crate::draw::plot::figure::Figure;
-use crate::draw::plot::style::Style;
 use crate::draw::plot::progress::pen;
 use crate::draw::plot::robot;
+use crate::draw::plot::style::Style;
 use crate::store::metrics::Moment;
 use std::ops::Range;
 
@@ -116,7 +116,10 @@ fn accuracies(canvas: &mut Canvas, page: f64, found: &Comparison, top: f64) -> f
         }
         let first = format!("accuracy less that of {} [points]", found.runs[0].name);
         let most = width + GAP;
-        plot.lower_axis(canvas, Some(&canvas.font().fitted(&first, TEXT, false, most)));
+        plot.lower_axis(
+            canvas,
+            Some(&canvas.font().fitted(&first, TEXT, false, most)),
+        );
     }
     top + height + AXIS
 }

@@ -35,7 +35,8 @@ pub(super) fn name(dossier: &Dossier) -> String {
     let folder = folder.map_or(String::new(), |folder| format!(" ({})", folder.display()));
     format!(
         "{}, seed {}{folder}",
-        dossier.run.name, dossier.run.config.seed
+        dossier.run.called(),
+        dossier.run.config.seed
     )
 }
 
