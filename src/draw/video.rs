@@ -11,7 +11,7 @@ use crate::draw::walk::Walk;
 use crate::task::recording::Recording;
 use std::ffi::OsString;
 use std::io::{self, Read, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use tiny_skia::Pixmap;
 
@@ -240,13 +240,30 @@ pub(crate) fn write_frames(
 /// Returns the command that makes a film of numbered pictures.
 pub(crate) fn command(folder: &Path, fps: f64) -> String {
     // A percent sign in a folder's name would be a number's place.
-    let input = in_shell(folder).replace('%', "%%");
-    let input = match input.ends_with('\'') {
-        true => format!("{input}/{NUMBERED}"),
-        false => quoted(format!("{}/{NUMBERED}", input.trim_end_matches('/'))),
-    };
+    let named = folder
+        .to_str()
+        .map(|name| PathBuf::from(name.replace('%', "%%")));
+    let input = in_shell(&named.unwrap_or_else(|| folder.to_path_buf()).join(NUMBERED));
     let filter = quoted(FILTER);
     format!(
         "ffmpeg -framerate {fps} -i {input} -vf {filter} -c:v libx264 -crf 18 -pix_fmt yuv420p film.mp4"
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_line_for_single_pictures_can_be_pasted_whatever_their_folder_is_called() {
+        let input = |folder: &str| {
+            let line = command(Path::new(folder), 50.0);
+            let (_, rest) = line.split_once(" -i ").unwrap();
+            rest.split_once(" -vf ").unwrap().0.to_string()
+        };
+        assert_eq!(input("frames"), "frames/frame-%05d.png");
+        assert_eq!(input("a 5%/"), "'a 5%%/frame-%05d.png'");
+        assert_eq!(input("-x"), "./-x/frame-%05d.png");
+        assert!(command(Path::new("frames"), 12.0).starts_with("ffmpeg -framerate 12 "));
+    }
 }
