@@ -10,7 +10,7 @@ use crate::draw::raster::png_bytes;
 use crate::draw::walk::Walk;
 use crate::task::recording::Recording;
 use std::ffi::OsString;
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use tiny_skia::Pixmap;
@@ -101,6 +101,8 @@ fn encode(
         .path()
         .join("film")
         .with_extension(container.ending());
+    // What it says goes to a file: a pipe that nobody reads would stop it.
+    let said = folder.path().join("said");
     let [width, height] = film.size();
     let mut command = Command::new(&program);
     command
@@ -123,21 +125,12 @@ fn encode(
         .arg(&made)
         .stdin(Stdio::piped())
         .stdout(Stdio::null())
-        .stderr(Stdio::piped());
+        .stderr(std::fs::File::create(&said).map_err(write)?);
     let mut encoder = command.spawn().map_err(|source| PictureError::NoEncoder {
         program: program.to_string_lossy().into_owned(),
         source,
     })?;
-    let stderr = encoder.stderr.take();
     let mut input = encoder.stdin.take().expect("its input is a pipe");
-    // What it says is read at the same time: a full pipe would stop it.
-    let said = std::thread::Builder::new().spawn(move || {
-        let mut said = String::new();
-        if let Some(stderr) = stderr {
-            let _ = stderr.take(1 << 16).read_to_string(&mut said);
-        }
-        said
-    });
     let shown = frames(&film, options, |picture| {
         let rgb: Vec<u8> = picture
             .data()
@@ -148,7 +141,6 @@ fn encode(
     });
     drop(input);
     let ended = encoder.wait();
-    let said = said.map(|thread| thread.join().unwrap_or_default());
     let failed = |how: String| PictureError::Encoder {
         program: program.to_string_lossy().into_owned(),
         how,
@@ -156,7 +148,8 @@ fn encode(
     match ended {
         // If it ends before the film does, that is the reason, not its closed pipe.
         Ok(status) if !status.success() => {
-            let said = said.unwrap_or_default();
+            let said = std::fs::read(&said).unwrap_or_default();
+            let said = String::from_utf8_lossy(&said);
             let last = said.lines().map(str::trim).rfind(|line| !line.is_empty());
             return Err(failed(match last {
                 Some(last) => format!("{status}: {last}"),
