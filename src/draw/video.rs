@@ -148,7 +148,7 @@ fn encode(
     match ended {
         // If it ends before the film does, that is the reason, not its closed pipe.
         Ok(status) if !status.success() => {
-            let said = std::fs::read(&said).unwrap_or_default();
+            let said = files::read_bytes(&said).unwrap_or_default();
             let said = String::from_utf8_lossy(&said);
             let last = said.lines().map(str::trim).rfind(|line| !line.is_empty());
             return Err(failed(match last {
@@ -160,7 +160,7 @@ fn encode(
         Err(error) => return Err(failed(error.to_string())),
     }
     let mut made =
-        std::fs::File::open(&made).map_err(|error| failed(format!("it wrote no film: {error}")))?;
+        files::open_file(&made).map_err(|error| failed(format!("it wrote no film: {error}")))?;
     files::write_whole(path, |file| io::copy(&mut made, file).map(drop)).map_err(write)
 }
 
@@ -226,7 +226,7 @@ pub(crate) fn write_frames(
     // An empty folder of that name may be there; any other is in the way.
     match std::fs::remove_dir(folder) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(failed(error)),
-        _ => std::fs::rename(temporary.keep(), folder).map_err(failed),
+        _ => std::fs::rename(temporary.path(), folder).map_err(failed),
     }
 }
 

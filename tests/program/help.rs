@@ -156,7 +156,7 @@ fn where_a_few_words_are_meant_shells_offer_them() {
         .ended(2, &["test or validation"]);
     sandbox
         .run("replay --format mpeg")
-        .ended(2, &["gif, html, png or terminal"]);
+        .ended(2, &["gif, html, png, mp4, webm, frames or terminal"]);
     sandbox.write("mine.toml", TINY);
     sandbox.run("config mine.toml").ended(0, &[]);
 }
