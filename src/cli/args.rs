@@ -150,7 +150,7 @@ Examples:
     /// Run the whole paper, at a chosen scale.
     #[command(after_help = reproduce::EXAMPLES)]
     Reproduce(ReproduceArgs),
-    /// Watch a robot: an animated GIF and a page for the browser, or a film.
+    /// Watch a robot: a GIF, a page for the browser, or a film.
     #[command(after_help = "\
 Examples:
   morphcog replay --robot best

@@ -1,6 +1,7 @@
 //! [`Film`]: the pictures of a recording: one image's rollout after the other, or the same moment
 //! of all rollouts side by side.
 
+use crate::base::threads::in_pool;
 use crate::draw::colour;
 use crate::draw::error::{PictureError, WIDTHS};
 use crate::draw::raster;
@@ -124,10 +125,12 @@ impl<'a> Film<'a> {
         mut show: impl FnMut(&Moment, &T) -> Result<(), PictureError>,
     ) -> Result<(), PictureError> {
         for batch in moments.chunks(BATCH) {
-            let made: Vec<_> = batch
-                .par_iter()
-                .map(|moment| self.picture(moment).map(&make))
-                .collect();
+            let pictures = || {
+                batch
+                    .par_iter()
+                    .map(|moment| self.picture(moment).map(&make))
+            };
+            let made: Vec<_> = in_pool(|| pictures().collect())?;
             for (moment, made) in batch.iter().zip(made) {
                 show(moment, &made?)?;
             }

@@ -100,6 +100,8 @@ pub(crate) struct Window {
     pub(crate) top: f64,
     /// The pixels per voxel length; details too small to see are left out.
     pub(crate) scale: f64,
+    /// The size of letters and lines: 1 in a small picture.
+    pub(crate) zoom: f64,
     /// True if voxels have hard edges, whose fewer colours keep animations small.
     pub(crate) crisp: bool,
     pub(crate) look: Look,
@@ -238,7 +240,7 @@ fn body(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
                 true => mark,
                 false => mark.mixed(fill, CRISP_MARK),
             };
-            let width = (colour::MARK_WIDTH * window.scale).max(1.0);
+            let width = (colour::MARK_WIDTH * window.scale / window.zoom).max(1.0);
             let larger = (MARK_PIXELS / (colour::MARK_EXTENT * window.scale)).max(1.0);
             let line = move |points: &&[[f64; 2]]| Primitive::Line {
                 points: points
@@ -322,6 +324,7 @@ mod tests {
         bottom: -2.0,
         top: 10.0,
         scale: 16.0,
+        zoom: 1.0,
         crisp: false,
         look: Look::Plain,
     };

@@ -128,6 +128,7 @@ impl Stage {
             bottom: (self.surface - f64::from(self.height)) / self.scale,
             top: (self.surface - self.panel) / self.scale,
             scale: self.scale,
+            zoom: self.zoom,
             crisp: self.crisp,
             look: self.look,
         }

@@ -10,8 +10,8 @@ use crate::draw::raster::png_bytes;
 use crate::draw::walk::Walk;
 use crate::task::recording::Recording;
 use std::ffi::OsString;
-use std::io::{self, Read, Write};
-use std::path::Path;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use tiny_skia::Pixmap;
 
@@ -101,6 +101,8 @@ fn encode(
         .path()
         .join("film")
         .with_extension(container.ending());
+    // What it says goes to a file: a pipe that nobody reads would stop it.
+    let said = folder.path().join("said");
     let [width, height] = film.size();
     let mut command = Command::new(&program);
     command
@@ -123,21 +125,12 @@ fn encode(
         .arg(&made)
         .stdin(Stdio::piped())
         .stdout(Stdio::null())
-        .stderr(Stdio::piped());
+        .stderr(std::fs::File::create(&said).map_err(write)?);
     let mut encoder = command.spawn().map_err(|source| PictureError::NoEncoder {
         program: program.to_string_lossy().into_owned(),
         source,
     })?;
-    let stderr = encoder.stderr.take();
     let mut input = encoder.stdin.take().expect("its input is a pipe");
-    // What it says is read at the same time: a full pipe would stop it.
-    let said = std::thread::Builder::new().spawn(move || {
-        let mut said = String::new();
-        if let Some(stderr) = stderr {
-            let _ = stderr.take(1 << 16).read_to_string(&mut said);
-        }
-        said
-    });
     let shown = frames(&film, options, |picture| {
         let rgb: Vec<u8> = picture
             .data()
@@ -148,7 +141,6 @@ fn encode(
     });
     drop(input);
     let ended = encoder.wait();
-    let said = said.map(|thread| thread.join().unwrap_or_default());
     let failed = |how: String| PictureError::Encoder {
         program: program.to_string_lossy().into_owned(),
         how,
@@ -156,7 +148,8 @@ fn encode(
     match ended {
         // If it ends before the film does, that is the reason, not its closed pipe.
         Ok(status) if !status.success() => {
-            let said = said.unwrap_or_default();
+            let said = files::read_bytes(&said).unwrap_or_default();
+            let said = String::from_utf8_lossy(&said);
             let last = said.lines().map(str::trim).rfind(|line| !line.is_empty());
             return Err(failed(match last {
                 Some(last) => format!("{status}: {last}"),
@@ -167,7 +160,7 @@ fn encode(
         Err(error) => return Err(failed(error.to_string())),
     }
     let mut made =
-        std::fs::File::open(&made).map_err(|error| failed(format!("it wrote no film: {error}")))?;
+        files::open_file(&made).map_err(|error| failed(format!("it wrote no film: {error}")))?;
     files::write_whole(path, |file| io::copy(&mut made, file).map(drop)).map_err(write)
 }
 
@@ -233,20 +226,37 @@ pub(crate) fn write_frames(
     // An empty folder of that name may be there; any other is in the way.
     match std::fs::remove_dir(folder) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(failed(error)),
-        _ => std::fs::rename(temporary.keep(), folder).map_err(failed),
+        _ => std::fs::rename(temporary.path(), folder).map_err(failed),
     }
 }
 
 /// Returns the command that makes a film of numbered pictures.
 pub(crate) fn command(folder: &Path, fps: f64) -> String {
     // A percent sign in a folder's name would be a number's place.
-    let input = in_shell(folder).replace('%', "%%");
-    let input = match input.ends_with('\'') {
-        true => format!("{input}/{NUMBERED}"),
-        false => quoted(format!("{}/{NUMBERED}", input.trim_end_matches('/'))),
-    };
+    let named = folder
+        .to_str()
+        .map(|name| PathBuf::from(name.replace('%', "%%")));
+    let input = in_shell(&named.unwrap_or_else(|| folder.to_path_buf()).join(NUMBERED));
     let filter = quoted(FILTER);
     format!(
         "ffmpeg -framerate {fps} -i {input} -vf {filter} -c:v libx264 -crf 18 -pix_fmt yuv420p film.mp4"
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_line_for_single_pictures_can_be_pasted_whatever_their_folder_is_called() {
+        let input = |folder: &str| {
+            let line = command(Path::new(folder), 50.0);
+            let (_, rest) = line.split_once(" -i ").unwrap();
+            rest.split_once(" -vf ").unwrap().0.to_string()
+        };
+        assert_eq!(input("frames"), "frames/frame-%05d.png");
+        assert_eq!(input("a 5%/"), "'a 5%%/frame-%05d.png'");
+        assert_eq!(input("-x"), "./-x/frame-%05d.png");
+        assert!(command(Path::new("frames"), 12.0).starts_with("ffmpeg -framerate 12 "));
+    }
 }

@@ -138,7 +138,7 @@ fn where_a_few_words_are_meant_shells_offer_them() {
     // Of eval and of team; bash has it for options.
     offered("test validation", 2);
     assert_eq!(bash.matches("compgen -W \"test validation\"").count(), 2);
-    offered("gif html png terminal", 2);
+    offered("gif html png mp4 webm frames terminal", 2);
     offered("plain paper", 1);
     offered("mnist fashion-mnist", 1);
     offered("builtin gates gates-3 gates-4 mnist fashion-mnist", 2);
@@ -157,7 +157,7 @@ fn where_a_few_words_are_meant_shells_offer_them() {
         .ended(2, &["test or validation"]);
     sandbox
         .run("replay --format mpeg")
-        .ended(2, &["gif, html, png or terminal"]);
+        .ended(2, &["gif, html, png, mp4, webm, frames or terminal"]);
     sandbox.write("mine.toml", TINY);
     sandbox.run("config mine.toml").ended(0, &[]);
 }

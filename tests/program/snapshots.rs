@@ -388,7 +388,7 @@ fn errors_of_single_commands_read_as_they_were_reviewed() {
     let pictures = [
         "plot archive -a run run/run.json",
         "plot archive -a run --robot best",
-        "plot archive -a run -o figure.pdf",
+        "plot archive -a run -o figure.eps",
         "plot body -a run -o run/",
         "plot body -a run --robot top:2 -o a.svg",
         "plot capacity -a run",

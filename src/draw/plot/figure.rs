@@ -9,10 +9,6 @@ use crate::store::names::FigureFormat;
 use std::path::PathBuf;
 use tiny_skia::{Color, Pixmap, Transform};
 
-/// Width of a journal's column: 85 mm in points.
-pub(crate) const COLUMN: f64 = 241.0;
-/// Width of a journal's page: 178 mm in points.
-pub(crate) const PAGE: f64 = 504.0;
 /// Pixels per inch of pictures for print.
 pub(crate) const PRINT: u32 = 300;
 /// Maximum number of pixels on a side of a PNG.

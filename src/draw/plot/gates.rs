@@ -8,8 +8,8 @@ use crate::draw::colour;
 use crate::draw::panel::present;
 use crate::draw::plot::axes::{Axis, MARGIN, colour_bar, heading};
 use crate::draw::plot::canvas::{Canvas, Pen, TextStyle};
-use crate::draw::plot::figure::{Figure, PAGE};
-use crate::draw::plot::style::Style;
+use crate::draw::plot::figure::Figure;
+use crate::draw::plot::style::{PAGE, Style};
 use crate::draw::plot::{robot, scales};
 
 /// Panels beside each other on a page.

@@ -7,8 +7,8 @@ use crate::draw::colour::Colour;
 use crate::draw::panel::present;
 use crate::draw::plot::axes::{Axis, MARGIN, colour_bar, heading};
 use crate::draw::plot::canvas::{Canvas, Pen, Piece, TextStyle};
-use crate::draw::plot::figure::{COLUMN, Figure};
-use crate::draw::plot::style::Style;
+use crate::draw::plot::figure::Figure;
+use crate::draw::plot::style::{COLUMN, Style};
 use crate::draw::plot::{robot, scales};
 use crate::store::response::{EndedBy, RobotResponse};
 

@@ -205,7 +205,7 @@ fn panel(canvas: &mut Canvas, walk: &Walk, phase: usize, every: usize, plot: &Pl
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::draw::plot::figure::{COLUMN, PAGE};
+    use crate::draw::plot::style::{COLUMN, PAGE};
     use crate::draw::simulated;
 
     #[test]

@@ -3,9 +3,13 @@
 use crate::base::error::Error;
 use crate::base::files::read_bytes;
 use crate::draw::fonts::Font;
-use crate::draw::plot::figure::{COLUMN, PAGE};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
+
+/// Width of a journal's column: 85 mm in points.
+pub(crate) const COLUMN: f64 = 241.0;
+/// Width of a journal's page: 178 mm in points.
+pub(crate) const PAGE: f64 = 504.0;
 
 /// Widths that a figure can have, millimetres: room for a legend, up to a large poster.
 pub(crate) const MILLIMETRES: RangeInclusive<u32> = 60..=1000;

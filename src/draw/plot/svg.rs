@@ -356,4 +356,21 @@ mod tests {
             "a&lt;b&gt;&amp;&quot;c\u{fffd}\u{fffd}"
         );
     }
+
+    #[test]
+    fn lines_are_broken_where_there_is_no_number() {
+        let mut canvas = Canvas::default();
+        let nan = f64::NAN;
+        let points = [
+            [0.0, 0.0],
+            [1.0, 1.0],
+            [2.0, nan],
+            [3.0, 1.0],
+            [4.0, 1.0],
+            [nan, 0.0],
+            [5.0, 5.0],
+        ];
+        canvas.polyline(&points, Pen::new(colour::INK, 1.0));
+        assert!(canvas.svg(Words::Text).contains("d=\"M0 0L1 1M3 1L4 1\""));
+    }
 }
