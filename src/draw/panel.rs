@@ -334,7 +334,7 @@ fn legend(walk: &Walk, [x, y]: [f64; 2], z: f64, out: &mut Vec<Primitive>) {
                     .iter()
                     .map(|point| colour::placed(*point, corners))
                     .collect(),
-                width: z,
+                width: 1.0,
                 colour,
                 smooth: true,
             }

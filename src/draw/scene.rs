@@ -330,6 +330,27 @@ mod tests {
     };
 
     #[test]
+    fn marks_keep_their_share_of_a_voxel_in_large_pictures() {
+        let recording = simulated("34/56", 1, 4, false);
+        let walk = Walk::new(&recording).unwrap();
+        let widest = |scale: f64, zoom: f64| {
+            let window = Window {
+                scale,
+                zoom,
+                ..WINDOW
+            };
+            let lines = body(&walk, 2, &window);
+            let widths = lines.iter().filter_map(|primitive| match primitive {
+                Primitive::Line { width, .. } => Some(zoom * width / scale),
+                _ => None,
+            });
+            widths.fold(0.0, f64::max)
+        };
+        assert!((widest(48.0, 3.0) - widest(16.0, 1.0)).abs() < 1e-12);
+        assert!(widest(48.0, 3.0) <= colour::MARK_WIDTH + 1e-12);
+    }
+
+    #[test]
     fn every_visible_voxel_is_a_quad_with_its_shade() {
         let recording = simulated("34/56", 1, 40, false);
         let walk = Walk::new(&recording).unwrap();
