@@ -137,8 +137,8 @@ impl RunData {
         }
     }
 
-    /// Returns the classes that a robot, by its whole id, answers by walking left and right, if it has
-    /// a task.
+    /// Returns the classes that a robot, by its whole id, answers by walking left and right, if it
+    /// has a task.
     fn answers(&self, id: &str) -> Option<(Vec<u8>, Vec<u8>)> {
         let known = self.run.elites.iter().find(|elite| elite.id == id);
         let Readout { left, right } = self.run.judge(known?)?;

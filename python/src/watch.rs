@@ -169,6 +169,14 @@ fn line(ProgressWords { label, parts }: &ProgressWords) -> String {
     format!("{label} {}", parts.join(" · "))
 }
 
+/// Describes counted work for Python.
+fn counted(work: &Work, done: u64) -> Value {
+    let Work {
+        label, total, unit, ..
+    } = work;
+    json!({ "label": label, "total": total, "done": done, "unit": unit })
+}
+
 impl Heard {
     fn new(waits: bool) -> Self {
         Heard {
@@ -243,7 +251,7 @@ impl Observer for Heard {
         let recent = Recent::new(self.seconds(), work.known);
         let mut said = self.said();
         said.work = Some((work.clone(), recent));
-        let fields = json!({ "label": work.label, "total": work.total, "done": work.known, "unit": work.unit });
+        let fields = counted(work, work.known);
         said.messages.push((BEGINS, work.label.clone(), fields));
     }
 
@@ -254,8 +262,7 @@ impl Observer for Heard {
         };
         let (seconds, before) = recent.since(self.seconds(), done, |done| *done);
         let words = count_line(&work.label, [before, done, work.total], work.unit, seconds);
-        let fields =
-            json!({ "label": work.label, "total": work.total, "done": done, "unit": work.unit });
+        let fields = counted(work, done);
         match said.messages.last_mut() {
             Some(last) if last.0 == PROGRESS => *last = (PROGRESS, line(&words), fields),
             _ => said.messages.push((PROGRESS, line(&words), fields)),

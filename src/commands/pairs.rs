@@ -86,8 +86,8 @@ pub struct PairsOptions {
 /// run.json files. Pairs that are done are kept: the same call goes on.
 ///
 /// # Errors
-/// Returns an error if an option, a run, the data or a folder is unsuitable, a pair failed, or it was
-/// stopped.
+/// Returns an error if an option, a run, the data or a folder is unsuitable, a pair failed, or it
+/// was stopped.
 pub fn pairs(
     options: &PairsOptions,
     out: Option<PathBuf>,

@@ -241,8 +241,8 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
 /// Makes one figure, of a run or of a robot of it, and writes nothing.
 ///
 /// # Errors
-/// Returns an error if an input is invalid, there are several runs or robots, or the figure cannot be
-/// made.
+/// Returns an error if an input is invalid, there are several runs or robots, or the figure cannot
+/// be made.
 pub fn one(wanted: &PlotOptions, session: &Session) -> Result<Figure, Error> {
     let [path] = &wanted.archives[..] else {
         return Err(Error::usage("expected one run".to_string()).about("archive"));

@@ -27,8 +27,8 @@ const COARSE_STEPS: f64 = 50.0;
 /// The approximate number of coordinates in a small page: ten moments a cycle for a body of 14 × 14
 /// voxels under two images.
 const SMALL: usize = 100_000;
-/// The maximum size of a small page's recording, bytes in base64: with the script and a still picture,
-/// a notebook's robot stays below 150 kB.
+/// The maximum size of a small page's recording, bytes in base64: with the script and a still
+/// picture, a notebook's robot stays below 150 kB.
 const MOST_SMALL: usize = 85_000;
 /// Code of a position that is not finite or over 163 voxel lengths from the frame's origin.
 const NOWHERE: i16 = i16::MIN;

@@ -12,12 +12,12 @@ use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-/// Height above the ground up to which a point touches it \[voxel lengths\]. A body at rest sinks in
-/// by less than that; smaller values miss points that bounce by a hair.
+/// Height above the ground up to which a point touches it \[voxel lengths\]; smaller values miss
+/// points that bounce by a hair.
 const CONTACT: f64 = 0.01;
 
-/// A body at one moment. Lengths are voxel lengths, x from the left edge of the starting box, y from
-/// the ground; energies are mass·wu²/s².
+/// A body at one moment. Lengths are voxel lengths, x from the left edge of the starting box, y
+/// from the ground; energies are mass·wu²/s².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment {
     /// The centre of mass.

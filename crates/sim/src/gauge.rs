@@ -13,12 +13,13 @@ pub struct EnergyNow {
     pub elastic: f64,
     /// The height of all points above the floor plane.
     pub gravitational: f64,
-    /// The energy that the actuators have put in since the start, as [`Energy::drive`](crate::Energy).
+    /// The energy that the actuators have put in since the start, as in
+    /// [`Energy::drive`](crate::Energy).
     pub drive: f64,
 }
 
 /// Measures the energies of a simulation between control steps: cheaper than
-/// [`World::with_energy_meter`], which looks at every substep, and for simulations side by side, too.
+/// [`World::with_energy_meter`], which looks at every substep, and possible side by side.
 #[derive(Clone, Debug)]
 pub struct EnergyGauge {
     meter: Meter,
@@ -52,7 +53,7 @@ impl EnergyGauge {
             now,
         } = self;
         meter.set_goals(&world.scratch.goals);
-        // The goals of a step are set at its start, when the points are where the last one left them.
+        // The goals of a step are set at its start, when the points are where the last left them.
         now.drive += meter.elastic(position) - now.elastic;
         position.clone_from(&world.state.position);
         now.elastic = meter.elastic(position);
