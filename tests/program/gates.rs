@@ -158,7 +158,7 @@ fn all_four_inputs_are_shown_side_by_side() {
     for pictures in ["-f html", "-f terminal", "-o page.html"] {
         sandbox
             .run(&format!("replay -a none.json {pictures} --side-by-side"))
-            .ended(2, &["side-by-side", "GIF and PNG"]);
+            .ended(2, &["side-by-side", "pictures and films"]);
     }
     sandbox
         .run("replay -a gallery:gates -f png --side-by-side --width 4000")
