@@ -33,7 +33,6 @@ impl Colour {
         format!("#{red:02x}{green:02x}{blue:02x}")
     }
 
-    /// Returns the gray of an intensity in [0, 1].
     /// Mixes a share of this colour, 0 to 1, with another one.
     pub(crate) fn mixed(self, other: Colour, share: f64) -> Self {
         let mix = |k: usize| {
@@ -43,6 +42,7 @@ impl Colour {
         Colour::new(mix(0), mix(1), mix(2))
     }
 
+    /// Returns the gray of an intensity in [0, 1].
     pub(crate) fn gray(intensity: f64) -> Self {
         let level = (255.0 * intensity.clamp(0.0, 1.0)).round() as u8;
         Colour::new(level, level, level)

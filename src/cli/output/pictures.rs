@@ -130,7 +130,7 @@ impl PicturesWanted {
     }
 
     /// Takes the format from a file's extension; without one, chooses a file for each of `formats`. A
-    /// folder is for the single pictures.
+    /// folder is for the frames of a film.
     pub(crate) fn named(path: &Path, formats: &[Format]) -> Result<Self, Error> {
         let is_folder = folder::check_is_file_path(path).is_err();
         if formats == [Format::Frames] || (formats.is_empty() && is_folder) {
