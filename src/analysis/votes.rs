@@ -215,7 +215,7 @@ impl Member {
         let still = displacements.iter().filter(is_still).count();
         Member {
             id: robot.id.clone(),
-            run: run.called().to_string(),
+            run: run.name.clone(),
             run_sha256: run_sha256.to_string(),
             task: robot.task.clone(),
             groups: [Group::A, Group::B].map(|group| split.classes(group).to_vec()),

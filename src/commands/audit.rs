@@ -60,6 +60,8 @@ pub struct AuditOptions {
 /// Result of an audit.
 #[derive(Clone, Debug)]
 pub struct AuditOutcome {
+    /// The name of the run for people.
+    pub(crate) called: String,
     pub(crate) file: AuditFile,
     /// Ids of the requested robots.
     pub(crate) asked: Vec<String>,
@@ -97,6 +99,7 @@ struct Trial {
 /// Returns an error if the archive, data, selection or criteria are wrong.
 pub fn audit(options: &AuditOptions, session: &Session) -> Result<AuditOutcome, Error> {
     let Opened {
+        called,
         config,
         fitness,
         training,
@@ -193,6 +196,7 @@ pub fn audit(options: &AuditOptions, session: &Session) -> Result<AuditOutcome, 
         }
         if stopped {
             return Ok(AuditOutcome {
+                called,
                 file,
                 asked,
                 known,
@@ -206,6 +210,7 @@ pub fn audit(options: &AuditOptions, session: &Session) -> Result<AuditOutcome, 
         unwritten.tried(file.write(&options.out), session)?;
     }
     Ok(AuditOutcome {
+        called,
         file,
         asked,
         known,
@@ -216,6 +221,7 @@ pub fn audit(options: &AuditOptions, session: &Session) -> Result<AuditOutcome, 
 }
 
 struct Opened {
+    called: String,
     config: Config,
     fitness: Fitness,
     training: TrainingImages,
@@ -255,14 +261,10 @@ fn open(options: &AuditOptions, session: &Session) -> Result<Opened, Error> {
         }
     }
     let order: Vec<String> = run.elites.iter().map(|robot| robot.id.clone()).collect();
-    let file = AuditFile::new(
-        run.called(),
-        run.fingerprint(),
-        order.len(),
-        &options.criteria,
-    );
+    let file = AuditFile::new(&run.name, run.fingerprint(), order.len(), &options.criteria);
     let (config, fitness) = (run.config.clone(), run.fitness());
     Ok(Opened {
+        called: run.called().to_string(),
         config,
         fitness,
         training,

@@ -27,7 +27,7 @@ use crate::store::folder::check_out;
 use crate::store::images::{HeldOut, HowMany};
 use crate::store::names::{EVAL_JSON, EVAL_VALIDATION_JSON};
 use crate::store::results::{self, replaced, write_with_table};
-use crate::store::run::{Robot, RunFile, different};
+use crate::store::run::{Robot, different};
 use crate::store::stored_run::StoredRun;
 use crate::store::unwritten::Unwritten;
 use crate::store::validation::Validated;
@@ -195,9 +195,10 @@ pub(crate) fn measure(options: &EvalOptions, session: &Session) -> Result<EvalFi
         .filter(|chosen| known(chosen.source, chosen.robot).is_none());
     let (open, images) = (open.count(), shown.images.len());
     if open > 0 {
-        let RunFile { name, config, .. } = &sources[0].run;
+        let run = &sources[0].run;
         let robots = counted(open, "robot", "robots");
-        let label = format!("evaluating {robots} of {name}, seed {}:", config.seed);
+        let (called, seed) = (run.called(), run.config.seed);
+        let label = format!("evaluating {robots} of {called}, seed {seed}:");
         let work = Work::new(label, (open * images) as u64, "rollouts");
         session.observer.begins(&work);
     }

@@ -451,13 +451,13 @@ fn of_run(wanted: &PlotOptions, path: &Path) -> Result<Figure, Error> {
         }
         FigureKind::Capacity => {
             let (beside, eval) = (result(path, CAPACITY_JSON), folder::beside(path, EVAL_JSON));
-            let file = CapacityFile::read(&beside).map_err(with_maker)?;
+            let mut file = CapacityFile::read(&beside).map_err(with_maker)?;
             if beside != *path {
                 let run = RunFile::read(path)?;
                 let is_of_it = match exists(&eval) {
                     // The runs of its robots.
                     true => file.is_of(&EvalFile::of_runs(&eval, &[&run])?),
-                    false => [&run.name, run.called()].contains(&file.run.as_str()),
+                    false => file.run == run.name,
                 };
                 if !is_of_it {
                     let text = format!(
@@ -467,6 +467,7 @@ fn of_run(wanted: &PlotOptions, path: &Path) -> Result<Figure, Error> {
                     let remedy = Remedy::Run(Invocation::new("capacity"), "makes that of this run");
                     return Err(Error::input(text).remedy(remedy));
                 }
+                file.run = run.called().to_string();
             }
             Ok(plot::capacity(&file, style))
         }

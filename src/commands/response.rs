@@ -65,6 +65,8 @@ pub struct ResponseOptions {
 pub struct ResponseOutcome {
     /// The results, as written to `response.json`.
     pub file: ResponseFile,
+    /// The name of the run for people.
+    pub(crate) called: String,
     /// Pictures of its robots, still to be drawn.
     pub(crate) pictures: Vec<[PathBuf; 3]>,
     /// True if it was stopped.
@@ -82,6 +84,8 @@ struct Subject {
 struct Provenance {
     config: Config,
     run: String,
+    /// The name for people.
+    called: String,
     sha256: String,
     dataset: DatasetRef,
     robots: Vec<(String, Body)>,
@@ -237,6 +241,7 @@ pub fn measure(options: &ResponseOptions, session: &Session) -> Result<ResponseO
     let ids: Vec<&str> = file.robots.iter().map(|robot| robot.id.as_str()).collect();
     let pictures = pictures(&options.out, &ids);
     Ok(ResponseOutcome {
+        called: provenance.called,
         pictures,
         file,
         stopped,
@@ -302,7 +307,8 @@ fn provenance(options: &ResponseOptions) -> Result<Provenance, Error> {
     let run = &source.run;
     Ok(Provenance {
         config: run.config.clone(),
-        run: run.called().to_string(),
+        run: run.name.clone(),
+        called: run.called().to_string(),
         sha256,
         dataset: run.dataset.clone(),
         robots,

@@ -303,7 +303,7 @@ impl EvalFile {
             format: FORMAT.to_string(),
             format_version: FORMAT_VERSION,
             program_version: env!("CARGO_PKG_VERSION").to_string(),
-            run: first.map_or(String::new(), |run| run.called().to_string()),
+            run: first.map_or(String::new(), |run| run.name.clone()),
             run_seed: first.map_or(0, |run| run.config.seed),
             runs: RunRef::of_all(sources),
             setting: first.map(|run| RunSetting {
@@ -401,12 +401,27 @@ impl EvalFile {
         format!("{}{trained}{stopped}", self.selected)
     }
 
-    /// Reads an evaluation of robots of these runs in their present state, and of no others.
+    /// Calls its runs what their folders are called now, for people.
+    fn called_as(mut self, runs: &[&RunFile]) -> Self {
+        let first = self.runs.first().map(|first| first.sha256.clone());
+        for run in runs {
+            let sha256 = run.fingerprint();
+            let same = self.runs.iter_mut().filter(|own| own.sha256 == sha256);
+            same.for_each(|own| own.name = run.called().to_string());
+            if first.as_ref() == Some(&sha256) {
+                self.run = run.called().to_string();
+            }
+        }
+        self
+    }
+
+    /// Reads an evaluation of robots of these runs in their present state, and of no others. It calls
+    /// the runs what their folders are called.
     pub(crate) fn of_runs(path: &Path, runs: &[&RunFile]) -> Result<Self, Error> {
         let file = Self::read(path)?;
         let now: Vec<String> = runs.iter().map(|run| run.fingerprint()).collect();
         match file.runs.iter().find(|run| !now.contains(&run.sha256)) {
-            None => Ok(file),
+            None => Ok(file.called_as(runs)),
             Some(run) => {
                 let text = format!(
                     "{}: stale: it is about another run, or another state of this one ({}, generation {}, SHA-256 \

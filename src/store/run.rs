@@ -245,7 +245,10 @@ fn folder_of(path: &Path) -> Option<String> {
     // In the present folder, only its absolute path has a name.
     let name = match parent.file_name() {
         Some(name) => name.to_os_string(),
-        None => parent.canonicalize().ok()?.file_name()?.to_os_string(),
+        None => {
+            let absolute = Path::new(".").join(parent).canonicalize().ok()?;
+            absolute.file_name()?.to_os_string()
+        }
     };
     Some(name.to_string_lossy().into_owned())
 }

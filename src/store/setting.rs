@@ -71,7 +71,7 @@ impl RunRef {
     fn of(source: &StoredRun) -> Self {
         let run = &source.run;
         RunRef {
-            name: run.called().to_string(),
+            name: run.name.clone(),
             seed: run.config.seed,
             generations: run.generations,
             training_images: run.training_images.clone(),

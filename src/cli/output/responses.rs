@@ -123,12 +123,17 @@ fn row(robot: &RobotResponse, is_taught: bool, has_window: bool) -> Vec<String> 
 
 /// Writes the pictures of the robots.
 pub(crate) fn pictures(console: &Console, finished: &ResponseOutcome) -> Result<(), PictureError> {
-    let ResponseOutcome { file, pictures, .. } = finished;
+    let ResponseOutcome {
+        file,
+        pictures,
+        called,
+        ..
+    } = finished;
     for (robot, paths) in file.robots.iter().zip(pictures) {
         let of = format!(
             "robot {}, {}",
             robot.id,
-            published::provenance(&file.run, file.run_seed)
+            published::provenance(called, file.run_seed)
         );
         let task = file.setting.task.as_deref();
         plot::response(robot, task, &of, &Style::default()).write(paths)?;

@@ -10,6 +10,7 @@ use std::path::Path;
 /// Writes an audit's results: a line per robot, the verdict counts, and changes that break walks.
 pub(crate) fn audit(console: &Console, finished: &AuditOutcome, out: &Path) {
     let AuditOutcome {
+        called,
         file,
         asked,
         known,
@@ -62,8 +63,7 @@ pub(crate) fn audit(console: &Console, finished: &AuditOutcome, out: &Path) {
         .map(|v| format!("{} {}", count(v), v.name()))
         .to_vec();
     console.line(&format!(
-        "{}: {}: {}",
-        file.run,
+        "{called}: {}: {}",
         counted(robots.len(), "robot", "robots"),
         counts.join(", ")
     ));

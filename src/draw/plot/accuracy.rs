@@ -116,6 +116,10 @@ fn name(report: &EvalFile, robot: &RobotReport) -> String {
     let has_several = seeds(report).is_some_and(|seeds| seeds.len() > 1);
     match report.runs.get(robot.run).filter(|_| has_several) {
         Some(run) => format!("{} ({})", robot.id, run.seed),
+        None if seeds(report).is_none() => match report.run_of(robot) {
+            Some(run) => format!("{} ({run})", robot.id),
+            None => robot.id.clone(),
+        },
         None => robot.id.clone(),
     }
 }

@@ -122,6 +122,8 @@ fn paired(difference: Option<&PairedDifference>) -> [String; 3] {
     let [low, high] = difference.interval.map(points);
     let p = match difference.p_adjusted {
         p if p < 0.001 => "<0.001".to_string(),
+        // Never rounded up to the level at which it would not be significant.
+        p if p < 0.05 => number::fixed((1000.0 * p).floor() / 1000.0, 3),
         p => number::fixed(p, 3),
     };
     let mean = points(difference.mean);
