@@ -139,7 +139,7 @@ fn a_comparison_writes_a_table_and_a_figure_above_the_runs() {
     assert!(column("difference")[0].is_empty() && !column("difference")[1].is_empty());
     let svg = sandbox.read("runs/compare.svg");
     for word in ["QD score", "coverage", "generation", "a1", "b1"] {
-        let label = format!("aria-label=\"{word}\"");
+        let label = format!("aria-label=\"{word}");
         assert!(svg.contains(&label), "{word}");
     }
     for file in ["runs/compare.png", "runs/compare.pdf"] {

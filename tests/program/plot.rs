@@ -80,7 +80,7 @@ fn every_kind_makes_a_well_formed_svg_a_png_and_a_pdf_beside_the_run() {
         assert!(words(&document).len() > 2, "{kind}");
         if kind != "capacity" {
             assert!(
-                svg.contains("tiny") && svg.contains("seed 3"),
+                svg.contains("run, seed 3"),
                 "{kind}: the title says run and seed"
             );
         }
@@ -141,12 +141,10 @@ fn a_figure_for_a_paper_has_its_width_no_title_and_the_font_of_the_paper() {
     assert_ne!(plain(&format!("--font {bold}")), own);
     // A letter that the font lacks is named; the program's own font draws a box.
     sandbox.write("漢.toml", TINY);
-    sandbox
-        .run("evolve -q -c 漢.toml -g 2 -o named")
-        .ended(0, &[]);
-    let refused = format!("plot archive -a named -o b --font {bold}");
+    sandbox.run("evolve -q -c 漢.toml -g 2 -o 漢").ended(0, &[]);
+    let refused = format!("plot archive -a 漢 -o b --font {bold}");
     sandbox.run(&refused).ended(3, &["--font", "漢"]);
-    sandbox.run("plot archive -a named -o b.svg").ended(0, &[]);
+    sandbox.run("plot archive -a 漢 -o b.svg").ended(0, &[]);
     sandbox.write("no.ttf", "no font");
     plot("--font no.ttf").ended(3, &["no.ttf", "font"]);
     plot("--font none.ttf").ended(3, &["none.ttf"]);
@@ -258,7 +256,20 @@ fn seeds_become_one_figure_and_robots_one_each() {
     sandbox
         .run("replay -a run -f gif -o figs/")
         .ended(2, &["--out figs/"]);
-    assert!(sandbox.read("both.svg").contains("seeds 3, 4"));
+    assert!(
+        sandbox
+            .read("both.svg")
+            .contains("run, seed 3; other, seed 4")
+    );
+    // Folders that differ in the seed only have one name.
+    for seed in [3, 4] {
+        let args = format!("evolve -q -c tiny.toml --seed {seed} -o runs/tiny-seed{seed}");
+        sandbox.run(&args).ended(0, &[]);
+    }
+    sandbox
+        .run("plot progress -q -a runs -o all.svg")
+        .ended(0, &[]);
+    assert!(sandbox.read("all.svg").contains("tiny, seeds 3, 4"));
     sandbox
         .run("plot progress -a run -a run/run.json")
         .ended(2, &["run/run.json"]);
@@ -357,7 +368,7 @@ fn progress_is_that_of_runs_with_two_generations_or_more() {
         .ended(0, &short);
     let svg = sandbox.read("both.svg");
     assert!(
-        svg.contains("tiny, seed 3") && !svg.contains("seeds"),
+        svg.contains("run, seed 3") && !svg.contains("seeds"),
         "{svg}"
     );
 }

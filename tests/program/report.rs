@@ -128,7 +128,7 @@ fn what_lies_beside_the_run_is_in_it_and_several_runs_go_together() {
 #[test]
 fn runs_of_one_name_and_seed_are_told_apart_and_so_are_their_copies() {
     let sandbox = Sandbox::tiny();
-    for (run, groups) in [("a", "[[0],[1]]"), ("b", "[[0],[2]]")] {
+    for (run, groups) in [("a/run", "[[0],[1]]"), ("b/run", "[[0],[2]]")] {
         let images = "--set data.train_images= --set data.images_per_class=1";
         sandbox
             .run(&format!(
@@ -137,13 +137,14 @@ fn runs_of_one_name_and_seed_are_told_apart_and_so_are_their_copies() {
             .ended(0, &[]);
     }
     sandbox
-        .run("report runs/a runs/b --rollouts 0")
+        .run("report runs/a/run runs/b/run --rollouts 0")
         .ended(0, &[]);
     let page = sandbox.read("runs/report.html");
     let links = between(&page, "<a href=\"#run", "</a>");
     assert_eq!(links.len(), 2, "{links:?}");
     assert!(
-        links[0].ends_with("(runs/a)") && links[1].ends_with("(runs/b)"),
+        links[0].ends_with("run, seed 3 (runs/a/run)")
+            && links[1].ends_with("run, seed 3 (runs/b/run)"),
         "{links:?}"
     );
     let copies = between(&page, "morphcog report --archive ", "<");
