@@ -127,7 +127,7 @@ fn robots_are_selected_in_the_same_words_by_every_command() {
         &best[0]
     };
     let said = sandbox.run("plot body -a a b --robots top:1").ended(0, &[]);
-    assert_eq!(said.out.matches("wrote").count(), 2, "{}", said.out);
+    assert_eq!(said.out.matches("wrote").count(), 3, "{}", said.out);
     assert!(said.out.contains(&fittest.id), "{}", said.out);
 }
 
