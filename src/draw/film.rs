@@ -38,7 +38,7 @@ pub struct FilmOptions {
 impl Default for FilmOptions {
     fn default() -> Self {
         FilmOptions {
-            width: 480,
+            width: 360,
             fps: 25.0,
             every: 2,
             look: Look::Plain,
