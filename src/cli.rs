@@ -25,6 +25,7 @@ use crate::base::error::{Error, ErrorKind};
 use crate::base::ranks::Ranks;
 use crate::base::remedy::Remedy;
 use crate::base::session::Session;
+use crate::base::stop::NEVER;
 use crate::base::text::counted;
 use crate::base::{signals, threads};
 use crate::cli::output::console::Console;
@@ -277,16 +278,17 @@ fn replay_best(
     brief: bool,
 ) -> Result<Vec<PathBuf>, Error> {
     let (robot, archive) = (BEST.to_string(), Some(folder.join(RUN_JSON)));
-    let replay = replay::replay(&replay::ReplayOptions {
+    let options = replay::ReplayOptions {
         robot,
         archive,
         ..shown
-    })?;
-    let wanted =
-        pictures::PicturesWanted::beside(folder, &replay.name, &[Format::Gif, Format::Html]);
+    };
+    let replay = replay::replay(&options, &NEVER)?;
+    let formats = [Format::Gif, Format::Html];
+    let wanted = pictures::PicturesWanted::beside(folder, &replay.name, &formats)?;
     match brief {
-        true => pictures::write(console, &replay, &wanted),
-        false => pictures::make(console, &replay, &wanted),
+        true => pictures::write(console, &replay, &wanted, &NEVER),
+        false => pictures::make(console, &replay, &wanted, &NEVER),
     }
 }
 
@@ -407,21 +409,25 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
         ));
     }
     let is_any = options.dataset.is_none() && options.data.is_none() && options.images.is_empty();
-    let replay = match replay::replay(&options) {
+    let stop = signals::stop_flag()?;
+    let subject = match replay::subject(&options) {
         Err(error) if is_first_look && is_any && error.kind == ErrorKind::Input => {
             console.info(&format!(
                 "{}; it sees the program's own digits instead",
                 error.message
             ));
-            replay::replay(&replay::ReplayOptions {
+            replay::subject(&replay::ReplayOptions {
                 dataset: Some(BUILTIN.to_string()),
                 ..options
             })
         }
-        replay => replay,
+        subject => subject,
     }?;
-    let wanted =
-        named.unwrap_or_else(|| pictures::PicturesWanted::beside(&folder, &replay.name, &format));
+    let wanted = match named {
+        Some(named) => named,
+        None => pictures::PicturesWanted::beside(&folder, &subject.found.name, &format)?,
+    };
+    let replay = replay::replay_subject(subject, &stop)?;
     let made = pictures::make(
         console,
         &replay,
@@ -433,6 +439,7 @@ fn run_replay(args: ReplayArgs, console: &Console) -> Result<(), Error> {
             side_by_side: args.side_by_side,
             ..wanted
         },
+        &stop,
     )?;
     match made.last().filter(|_| open) {
         Some(path) => show(path),

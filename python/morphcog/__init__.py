@@ -176,11 +176,11 @@ def import_dataset(
         if test_pixels is not None or test_labels is not None:
             raise Error("test_pixels, test_labels: expected pixels and labels with them")
     else:
-        splits.append((_pictures(pixels, "pixels"), _labels(labels, "labels")))
+        splits.append((_grey_pictures(pixels, "pixels"), _labels(labels, "labels")))
         if (test_pixels is None) != (test_labels is None):
             raise Error("test_pixels, test_labels: expected both or none")
         if test_pixels is not None:
-            splits.append((_pictures(test_pixels, "test_pixels"), _labels(test_labels, "test_labels")))
+            splits.append((_grey_pictures(test_pixels, "test_pixels"), _labels(test_labels, "test_labels")))
     choices = [None if choice is None else bool(choice) for choice in (invert, transpose)]
     size, seed = _whole(size, "size", 0), _whole(seed, "seed", 0)
     with _Progress(quiet) as progress:
@@ -195,7 +195,7 @@ def import_dataset(
     return Imported(about.pop("name"), _pathlib.Path(folder), tuple(about.pop("size")), classes, about)
 
 
-def _pictures(value, what):
+def _grey_pictures(value, what):
     """Images as one array, or as a list of arrays of different sizes."""
     try:
         return _numbers(_np.asarray(value), what, "images, whole numbers or fractions")
@@ -608,6 +608,7 @@ class Run:
 
         task: two groups of classes, as "4|9", to write the accuracy that training could reach to response.json
         beside the run. images: most rollouts of a robot. error: relative error of the slopes at which it ends.
+        response.svg, .png and .pdf beside the run show the slopes; of several robots, one each.
         """
         images, seed = _whole(images, "images", 0), _whole(seed, "seed", 0)
         with _Progress(quiet) as progress:

@@ -2,7 +2,9 @@
 
 import base64
 import html
+import os
 import pathlib
+import secrets
 
 from ._morphcog import Error
 from ._values import _path, _whole
@@ -20,14 +22,12 @@ class Figure:
         path, dpi = pathlib.Path(_path(path)), _whole(dpi, "dpi", 36, 2400)
         ending = path.suffix.lower()
         if ending == ".svg":
-            path.write_text(self._data.svg_file(), encoding="utf-8")
-        elif ending == ".png":
-            path.write_bytes(self._data.png(dpi))
-        elif ending == ".pdf":
-            path.write_bytes(self._data.pdf())
-        else:
-            raise Error(f"path={path}: expected a name that ends in .svg, .png or .pdf")
-        return path
+            return written(path, self._data.svg_file().encode())
+        if ending == ".png":
+            return written(path, self._data.png(dpi))
+        if ending == ".pdf":
+            return written(path, self._data.pdf())
+        raise Error(f"path={path}: expected a name that ends in .svg, .png or .pdf")
 
     def _repr_svg_(self):
         return self._data.svg()
@@ -56,14 +56,12 @@ class Recording:
         width, every = _whole(width, "width", 1, 2**32 - 1), _whole(every, "every", 1)
         ending = path.suffix.lower()
         if ending == ".html":
-            path.write_text(self._data.page(), encoding="utf-8")
-        elif ending == ".gif":
-            path.write_bytes(self._data.gif(width, every, bool(side_by_side)))
-        elif ending == ".png":
-            path.write_bytes(self._data.still(True))
-        else:
-            raise Error(f"path={path}: expected a name that ends in .html, .gif or .png")
-        return path
+            return written(path, self._data.page().encode())
+        if ending == ".gif":
+            return written(path, self._data.gif(width, every, bool(side_by_side)))
+        if ending == ".png":
+            return written(path, self._data.still(True))
+        raise Error(f"path={path}: expected a name that ends in .html, .gif or .png")
 
     def _repr_html_(self):
         still = self._data.still(False)
@@ -71,6 +69,21 @@ class Recording:
 
     def __repr__(self):
         return self._words
+
+
+def written(path, content):
+    """Writes a file whole or not at all, through a temporary one in its folder, and returns its path."""
+    target = path.resolve()  # a link stays
+    if target.exists() and not target.is_file():
+        path.write_bytes(content)  # a device, a pipe
+        return path
+    temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
+    try:
+        temporary.write_bytes(content)
+        os.replace(temporary, target)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return path
 
 
 def picture(still, title):

@@ -86,7 +86,8 @@ pub(crate) fn train_run(
 ) -> PyResult<PathBuf> {
     let _environment = entered()?;
     let robots = robots.map(|robots| parsed("robots", robots)).transpose()?;
-    let [of_one, of_each] = train::GAITS.map(Selection::Top);
+    let of_one = Selection::Top(train::GAITS_OF_ONE);
+    let of_each = Selection::Top(train::GAITS_OF_EACH);
     let first = archives
         .first()
         .ok_or_else(|| refused("run: expected one run or more"))?;
@@ -162,7 +163,7 @@ pub(crate) fn train_pairs(
     let robots = robots.map(|robots| parsed("robots", robots)).transpose()?;
     let options = PairsOptions {
         archives,
-        robots: robots.unwrap_or(Selection::Top(train::GAITS[1])),
+        robots: robots.unwrap_or(Selection::Top(train::GAITS_OF_EACH)),
         dataset,
         classes,
         seed,

@@ -12,10 +12,11 @@ use morphcog::draw::walk::Walk;
 use morphcog::draw::{html, raster};
 use morphcog::task::protocol::Protocol;
 use morphcog::task::recording::{LabelledStimulus, Recording};
-use morphcog::task::rollout::record;
+use morphcog::task::rollout::{check_length, record_unless};
 use numpy::{PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
+use std::sync::atomic::AtomicBool;
 
 /// Width of pictures in a notebook \[pixels\].
 const WIDTH: u32 = 480;
@@ -101,9 +102,12 @@ impl RecordingData {
         let images = (0..stimuli.shape()[0])
             .map(image)
             .collect::<PyResult<Vec<_>>>()?;
-        let recording = watched(py, |_| {
-            record("", &body, &physics, &protocol, true, &images)
+        check_length([body.height(), body.width()], &protocol, images.len())
+            .map_err(|error| raised(&error))?;
+        let recorded = watched(py, |stop| {
+            record_unless("", &body, (&physics, &protocol), true, &images, stop)
         })?;
+        let recording = recorded.map_err(|stopped| raised(&stopped.into()))?;
         Ok(RecordingData::new(recording))
     }
 
@@ -121,21 +125,21 @@ impl RecordingData {
 
     /// Returns a page for a browser.
     fn page(&self, py: Python) -> PyResult<String> {
-        self.drawn(py, || {
+        self.drawn(py, |_| {
             Ok(html::page(&self.recording, &self.title, &self.about)?)
         })
     }
 
     /// Returns a small page for a notebook.
     fn small_page(&self, py: Python) -> PyResult<String> {
-        self.drawn(py, || {
+        self.drawn(py, |_| {
             Ok(html::small_page(&self.recording, &self.title, &self.about)?)
         })
     }
 
     /// Returns the last moment as a GIF, which is smaller, or as a PNG.
     fn still<'py>(&self, py: Python<'py>, png: bool) -> PyResult<Bound<'py, PyBytes>> {
-        let bytes = self.drawn(py, || {
+        let bytes = self.drawn(py, |_| {
             let walk = Walk::new(&self.recording)?;
             let last = walk.frames() - 1;
             Ok(match png {
@@ -156,7 +160,7 @@ impl RecordingData {
     ) -> PyResult<Bound<'py, PyBytes>> {
         let mut options = FilmOptions::default();
         (options.width, options.every, options.side_by_side) = (width, every, side_by_side);
-        let bytes = self.drawn(py, || Ok(gif::encode(&self.recording, &options)?))?;
+        let bytes = self.drawn(py, |stop| Ok(gif::encode(&self.recording, &options, stop)?))?;
         Ok(PyBytes::new(py, &bytes))
     }
 }
@@ -181,9 +185,9 @@ impl RecordingData {
     fn drawn<T: Send>(
         &self,
         py: Python,
-        draw: impl Fn() -> Result<T, Error> + Sync,
+        draw: impl FnOnce(&AtomicBool) -> Result<T, Error> + Send,
     ) -> PyResult<T> {
         let _environment = entered()?;
-        watched(py, |_| draw())?.map_err(|error| raised(&error))
+        watched(py, draw)?.map_err(|error| raised(&error))
     }
 }

@@ -56,7 +56,7 @@ fn words(remedy: &Remedy) -> String {
         Remedy::NameMirror => "name another mirror".to_string(),
         Remedy::ChoosePort => "name another port, or leave it out to take a free one".to_string(),
         Remedy::NameRobot(id) => format!("name one, such as {id}"),
-        Remedy::WriteFrames => "write its single pictures".to_string(),
+        Remedy::WriteFrames => "write its frames".to_string(),
         Remedy::FreeSpace(folder) => {
             format!("make space on the disk that {} is on", folder.display())
         }

@@ -154,7 +154,7 @@ impl RunData {
             ..replay::ReplayOptions::default()
         };
         let pool = pool(None).map_err(|error| raised(&error))?;
-        let replay = watched(py, |_| pool.install(|| replay::replay(&options)))?;
+        let replay = watched(py, |stop| pool.install(|| replay::replay(&options, stop)))?;
         let replay = replay.map_err(|error| raised(&error))?;
         let title = format!("morphcog: robot {}", replay.name);
         Ok(RecordingData::new(replay.recording).entitled(title, replay.about))
@@ -254,7 +254,11 @@ impl RunData {
                 seed,
                 out: out.clone(),
             };
-            response::measure(&options, session).map(|finished| finished.unwritten)
+            let finished = response::measure(&options, session)?;
+            if finished.unwritten.is_none() {
+                finished.draw(|_| ())?;
+            }
+            Ok(finished.unwritten)
         })?;
         written(unwritten, &out)
     }

@@ -8,7 +8,7 @@ use crate::watch::check_interrupt;
 use morphcog::body::Body;
 use morphcog::sim::{FloatEnvironment, Start, System};
 use morphcog::task::protocol::MAX_ROW;
-use morphcog::task::rollout::moment;
+use morphcog::task::rollout::{moment, place};
 use numpy::{PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
@@ -178,11 +178,7 @@ impl Simulation {
     }
 
     /// Converts a position to voxel lengths, with y from the ground.
-    fn lengths(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let physics = self.world.system().physics();
-        [
-            x / physics.cell_size,
-            y / physics.cell_size - f64::from(physics.ground_row),
-        ]
+    fn lengths(&self, at: [f64; 2]) -> [f64; 2] {
+        place(at, self.world.system().physics())
     }
 }

@@ -315,7 +315,7 @@ def test_in_a_terminal_tqdm_shows_a_bar_if_it_is_installed(tmp_path, capsys, mon
     said = capsys.readouterr().err
     assert re.search(r"evolving: 100%\|.*\| 3/3 \[.*best=.*coverage=", said), said
     run.evaluate("best", images=4)
-    assert re.search(r"8/8 \[.* rollouts/s", capsys.readouterr().err.replace("4/4", "8/8"))
+    assert re.search(r"100%\|.*\| 4/4 \[.* rollouts/s", capsys.readouterr().err)
 
 
 def test_a_callback_sees_every_generation_and_ends_evolution_where_it_says(tmp_path):
@@ -717,8 +717,8 @@ def test_runs_are_iterated_and_say_what_they_are(run):
     assert repr(run).startswith("Run('") and f"robots={len(run)}, best={run['best'].objective:.2f}" in repr(run)
     assert list(run.metrics.generation)[: run.generations] == list(range(run.generations))
     published = mc.load_run("gallery:")
-    assert [robot.id for robot in published] == ["APUKI", "IHSUJ", "QMAXD", "RSTAM", "YJTLA"] or len(published) == 5
-    assert published["yjtla"].answers == {"left": [0], "right": [1]} or published["yjtla"].answers["left"] == [1]
+    assert [robot.id for robot in published] == ["APUKI", "IHSUJ", "QMAXD", "XFJPI", "YJTLA"]
+    assert published["yjtla"].answers == {"left": [0], "right": [1]}
     assert [shipped["best"].task for shipped in mc.load_runs("gallery:zero_one")] == ["0|1"] * 3
 
 
@@ -726,12 +726,36 @@ def test_figures_are_shown_and_saved_by_their_ending(run, tmp_path):
     for kind in ["archive", "progress", "body", "spacetime", "snapshots"]:
         figure = run.plot(kind)
         assert figure._repr_svg_().startswith("<svg") and repr(figure).startswith("Figure('")
-    assert figure.save(tmp_path / "walk.svg").read_text() == figure._repr_svg_()
+    assert figure.save(tmp_path / "walk.svg").read_text() == figure._data.svg_file()
+    assert figure.save(tmp_path / "walk.pdf").read_bytes().startswith(b"%PDF-")
     small, large = (figure.save(tmp_path / f"{dpi}.png", dpi=dpi).read_bytes() for dpi in (50, 100))
     assert small.startswith(b"\x89PNG") and len(small) < len(large)
     assert run["best"].plot("body")._repr_svg_() == run.plot("body", run["best"].id)._repr_svg_()
-    with pytest.raises(mc.Error, match="ends in .svg or .png"):
+    with pytest.raises(mc.Error, match=r"ends in \.svg, \.png or \.pdf"):
         figure.save(tmp_path / "walk.txt")
+
+
+def test_files_are_written_whole_or_not_at_all(run, tmp_path, monkeypatch):
+    figure, path = run.plot("body"), tmp_path / "body.svg"
+    path.write_text("old")
+    link = tmp_path / "link.svg"
+    link.symlink_to(path)
+
+    def fails(source, target):
+        raise OSError("no space")
+
+    with monkeypatch.context() as broken:
+        broken.setattr("os.replace", fails)
+        with pytest.raises(OSError, match="no space"):
+            figure.save(path)
+    assert path.read_text() == "old" and sorted(file.name for file in tmp_path.iterdir()) == ["body.svg", "link.svg"]
+    assert figure.save(link) == link and link.is_symlink()
+    assert path.read_text() == figure._data.svg_file()
+
+
+def test_recordings_that_would_fill_the_memory_are_refused():
+    with pytest.raises(mc.Error, match="control_steps = 1000000: expected at most .* under 20 images; show fewer"):
+        mc.show(np.full((14, 14), 3, np.uint8), np.zeros((20, 14, 14)), control_steps=1_000_000)
 
 
 def test_any_body_is_shown_small_and_saved_as_page_animation_or_picture(run, tmp_path):
@@ -779,6 +803,11 @@ def test_a_gait_is_trained_measured_and_tested_as_a_team(run, tmp_path, monkeypa
     assert sorted(answers["left"] + answers["right"]) == [0, 1]
     table = trained.response(images=60, task="0|1", set={"protocol.control_steps": 50}, quiet=True)
     assert list(table.columns) == ["id", "row", "column", "material", "slope", "error"] and len(table) > 0
+    pictures = [trained.path.with_name(f"response.{ending}") for ending in ("svg", "png", "pdf")]
+    assert all(picture.is_file() for picture in pictures)
+    # Other results have other pictures.
+    trained.response(images=120, error=0, set={"protocol.control_steps": 50}, task="0|1", quiet=True)
+    assert all(picture.is_file() for picture in pictures)
     team = mc.team(trained, classes=[0, 1], images=20, quiet=True, out="team.json")
     assert 0 <= team.interval[0] <= team.accuracy <= team.interval[1] <= 1
     assert list(team.members.id) == [trained["best"].id] and team.confusion._repr_svg_().startswith("<svg")
@@ -797,14 +826,18 @@ def test_pairs_are_trained_once_and_answer_as_a_team(tmp_path):
     assert len(mc.team(runs, classes=[0, 1, 2], images=30, quiet=True).members) == 3
 
 
-def test_ctrl_c_ends_rollouts():
-    code = """
+@pytest.mark.parametrize(
+    "work",
+    ["mc.rollouts([body] * 4000, np.zeros((1, 14, 14)), every=100)", "mc.show(body, control_steps=220_000)"],
+)
+def test_ctrl_c_ends_rollouts(work):
+    code = f"""
 import signal, time, numpy as np, morphcog as mc
 signal.signal(signal.SIGINT, signal.default_int_handler)
 body = np.full((14, 14), 3, np.uint8); body[:7] = 4
 print("begins", flush=True)
 try:
-    mc.rollouts([body] * 4000, np.zeros((1, 14, 14)), every=100)
+    {work}
 except KeyboardInterrupt:
     print(time.time())
 """
@@ -814,4 +847,4 @@ except KeyboardInterrupt:
     sent = time.time()
     child.send_signal(signal.SIGINT)
     said, _ = child.communicate(timeout=20)
-    assert child.returncode == 0 and float(said) - sent < 1
+    assert child.returncode == 0 and float(said) - sent < 10

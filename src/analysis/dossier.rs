@@ -4,7 +4,6 @@ use crate::analysis::comparison::{Comparison, Subject, best_of_each_task, compar
 use crate::analysis::progress::Progress;
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
-use crate::base::text::counted;
 use crate::config::Config;
 use crate::data::dataset::Split;
 use crate::images::whereabouts::{Whereabouts, labelled, load_dataset_of};
@@ -21,11 +20,8 @@ use crate::store::stored_run::StoredRun;
 use crate::store::team::{Member, TeamFile};
 use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::recording::{LabelledStimulus, Recording};
-use crate::task::rollout::record;
+use crate::task::rollout::{check_length, record};
 use std::path::{Path, PathBuf};
-
-/// Most places of points in a recording: some gigabyte.
-const MOST_PLACES: usize = 50_000_000;
 
 /// Most images in the rollouts of a page: one of each class, if there are more.
 const MOST_IMAGES: usize = 4;
@@ -361,7 +357,8 @@ fn images(
             is_first
         });
     }
-    check_length(&run.config, shown.len()).map_err(without)?;
+    let body = [run.config.body.height, run.config.body.width];
+    check_length(body, &run.config.protocol, shown.len()).map_err(without)?;
     let one = |image: &ImageRef| {
         labelled(&run.config, &dataset, Split::Train, *image).map_err(|error| {
             error
@@ -370,21 +367,6 @@ fn images(
         })
     };
     shown.iter().map(one).collect()
-}
-
-/// Checks that a recording, which holds every point at every moment, is short enough.
-pub(crate) fn check_length(config: &Config, images: usize) -> Result<(), Error> {
-    let points = (config.body.height + 1) * (config.body.width + 1);
-    let most = MOST_PLACES / points / images.max(1);
-    let steps = config.protocol.control_steps;
-    match steps as usize > most {
-        true => Err(Error::input(format!(
-            "protocol.control_steps = {steps}: expected at most {most} to record a rollout under {}",
-            counted(images, "image", "images")
-        ))
-        .advice("show fewer images")),
-        false => Ok(()),
-    }
 }
 
 impl Dossier {

@@ -50,7 +50,7 @@ pub enum Remedy {
     ChoosePort,
     /// Name one robot, for example this one.
     NameRobot(String),
-    /// Write the single pictures of a film, for another encoder.
+    /// Write the frames of a film, for another encoder.
     WriteFrames,
     /// Free space on the disk of a folder.
     FreeSpace(PathBuf),

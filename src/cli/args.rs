@@ -165,7 +165,7 @@ Examples:
   morphcog replay --robot best -o walk.gif
   # a film for a talk, by ffmpeg
   morphcog replay --robot best -o walk.mp4
-  # its single pictures, and the line that makes a film
+  # its frames, and the command that makes a film of them
   morphcog replay --robot best -o frames/")]
     Replay(ReplayArgs),
     /// Make a figure: SVG, PNG and PDF for papers and pages.
@@ -386,7 +386,7 @@ pub(super) struct ReplayArgs {
     #[arg(short, long, value_delimiter = ',', value_parser = offering(Format::ALL.map(|(_, name)| name), str::parse::<Format>))]
     pub(super) format: Vec<Format>,
     /// File; its ending (.gif, .html, .png, .mp4, .webm) sets the format; a folder, such as frames/,
-    /// takes a film's single pictures (default: replay-<robot> beside run.json).
+    /// takes a film's frames (default: replay-<robot> beside run.json).
     #[arg(short, long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
     /// Show all images at once, instead of one after another (the page has a button).

@@ -93,7 +93,7 @@ fn words(remedy: &Remedy) -> String {
         }
         Remedy::NameRobot(id) => format!("name one, as in --robot {id}"),
         Remedy::WriteFrames => {
-            "write its pictures with --format frames, which says the line that makes a film"
+            "write its frames with --format frames, which prints the command that makes a film of them"
                 .to_string()
         }
         Remedy::FreeSpace(folder) => {

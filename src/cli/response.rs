@@ -118,7 +118,7 @@ pub(super) fn run(args: ResponseArgs, console: &Console) -> Result<(), Error> {
     if let Some(error) = finished.unwritten {
         return Err(error);
     }
-    responses::pictures(console, &finished)?;
+    finished.draw(|path| console.line_about(path, &format!("wrote {}", path.display())))?;
     if finished.stopped {
         let text = match finished.file.robots.len() {
             0 if finished.file.unfinished.is_empty() => {

@@ -171,12 +171,12 @@ pub(super) fn run(args: TrainArgs, console: &Console) -> Result<(), Error> {
     let (archive, robots) = match archives.as_slice() {
         [archive] => (
             archive.clone(),
-            robots.unwrap_or(Selection::Top(train::GAITS[0])),
+            robots.unwrap_or(Selection::Top(train::GAITS_OF_ONE)),
         ),
         _ => {
             let gaits = Gaits {
                 archives,
-                robots: robots.unwrap_or(Selection::Top(train::GAITS[1])),
+                robots: robots.unwrap_or(Selection::Top(train::GAITS_OF_EACH)),
                 groups: groups.clone(),
                 seed: args.seed,
                 set: set.clone(),
@@ -216,7 +216,7 @@ fn pairs(args: TrainArgs, console: &Console) -> Result<(), Error> {
     }
     let options = PairsOptions {
         archives,
-        robots: selected(args.robots)?.unwrap_or(Selection::Top(train::GAITS[1])),
+        robots: selected(args.robots)?.unwrap_or(Selection::Top(train::GAITS_OF_EACH)),
         dataset: args.dataset.clone(),
         classes: (!args.classes.is_empty()).then_some(args.classes.clone()),
         seed: args.seed,
@@ -355,7 +355,7 @@ pub(super) fn after_evolution(
     Ok(TrainOptions {
         out: of_training,
         archive,
-        robots: Selection::Top(train::GAITS[0]),
+        robots: Selection::Top(train::GAITS_OF_ONE),
         groups: groups.clone(),
         seed: None,
         set: Vec::new(),

@@ -175,43 +175,20 @@ pub fn plot(wanted: &PlotOptions, session: &Session) -> Result<PlotOutcome, Erro
         Ok(())
     };
     if wanted.kind == FigureKind::Progress {
-        let paths: Vec<&Path> = archives.iter().map(PathBuf::as_path).collect();
-        let runs: Vec<RunFile> = paths
-            .iter()
-            .map(|path| RunFile::read(path))
-            .collect::<Result<_, _>>()?;
-        let named = || paths.iter().copied().zip(&runs);
-        different(named())?;
-        let (mut lines, mut short) = (Vec::new(), Vec::new());
-        for (path, run) in named() {
-            let line = Progress::of(run, path)?;
-            match line.moments.len() {
-                0 | 1 => short.push(too_short(path, run, line.moments.len())),
-                _ => lines.push(line),
-            }
-        }
-        match short.first() {
-            Some(error) if lines.is_empty() => return Err(error.clone()),
-            _ => short
-                .iter()
-                .for_each(|error| session.observer.warning(&format!("{error}; left out"))),
-        }
-        let figure = plot::progress(&lines, &wanted.style);
+        let (figure, lines) = of_progress(wanted, &archives, session)?;
         let stem = folder::beside_all(&archives, &format!("plot-{}", wanted.kind));
         write(Made { figure, stem })?;
         progress = lines;
     } else if wanted.kind == FigureKind::Gates {
         for path in &archives {
-            let source = StoredRun::read(path)?;
-            let found = analysis::gates::walks(&source, session)?;
-            let figure = plot::gates(&found, source.run.called(), &wanted.style);
+            let (figure, found) = of_gates(wanted, path, session)?;
             let stem = stem(path, wanted.kind, "");
             write(Made { figure, stem })?;
             gates.extend(found);
         }
     } else if wanted.kind.is_of_robot() {
         for robot in &wanted.robots {
-            write(of_robot(wanted, robot)?)?;
+            write(of_robot(wanted, robot, session)?)?;
         }
     } else {
         if wanted.kind == FigureKind::Archive {
@@ -252,21 +229,10 @@ pub fn one(wanted: &PlotOptions, session: &Session) -> Result<Figure, Error> {
             let [robot] = &wanted.robots[..] else {
                 return Err(Error::usage("expected one robot".to_string()).about("robot"));
             };
-            of_robot(wanted, robot)?.figure
+            of_robot(wanted, robot, session)?.figure
         }
-        FigureKind::Gates => {
-            let source = StoredRun::read(path)?;
-            let found = analysis::gates::walks(&source, session)?;
-            plot::gates(&found, source.run.called(), &wanted.style)
-        }
-        FigureKind::Progress => {
-            let run = RunFile::read(path)?;
-            let line = Progress::of(&run, path)?;
-            match line.moments.len() {
-                0 | 1 => return Err(too_short(path, &run, line.moments.len())),
-                _ => plot::progress(&[line], &wanted.style),
-            }
-        }
+        FigureKind::Gates => of_gates(wanted, path, session)?.0,
+        FigureKind::Progress => of_progress(wanted, &wanted.archives, session)?.0,
         _ => of_run(wanted, path)?,
     };
     Ok(figure.on(wanted.background))
@@ -393,7 +359,7 @@ fn stem(archive: &Path, kind: FigureKind, robot: &str) -> PathBuf {
     }
 }
 
-fn of_robot(wanted: &PlotOptions, named: &Named) -> Result<Made, Error> {
+fn of_robot(wanted: &PlotOptions, named: &Named, session: &Session) -> Result<Made, Error> {
     let Named { archive, robot } = named.clone();
     let options = ReplayOptions {
         robot,
@@ -413,12 +379,56 @@ fn of_robot(wanted: &PlotOptions, named: &Named) -> Result<Made, Error> {
     }
     let subject = replay::subject(&options)?;
     let title = subject.found.title();
-    let recording = replay::record_subject(&subject);
+    let recording = replay::record_subject(&subject, session.stop)?;
     let figure = match wanted.kind {
         FigureKind::Snapshots => plot::snapshots(&recording, wanted.every, &title, &wanted.style),
         _ => plot::spacetime(&recording, &title, &wanted.style),
     }?;
     Ok(made(&subject.found, figure))
+}
+
+/// Makes the figure of a run's logic gates; returns their walks, too.
+fn of_gates(
+    wanted: &PlotOptions,
+    path: &Path,
+    session: &Session,
+) -> Result<(Figure, Vec<GateWalks>), Error> {
+    let source = StoredRun::read(path)?;
+    let found = analysis::gates::walks(&source, session)?;
+    let figure = plot::gates(&found, source.run.called(), &wanted.style);
+    Ok((figure, found))
+}
+
+/// Makes the figure of the metrics of runs; returns the lines, too. Runs that are too short are
+/// left out with a warning, unless all are.
+fn of_progress(
+    wanted: &PlotOptions,
+    archives: &[PathBuf],
+    session: &Session,
+) -> Result<(Figure, Vec<Progress>), Error> {
+    let paths: Vec<&Path> = archives.iter().map(PathBuf::as_path).collect();
+    let runs: Vec<RunFile> = paths
+        .iter()
+        .map(|path| RunFile::read(path))
+        .collect::<Result<_, _>>()?;
+    let named = || paths.iter().copied().zip(&runs);
+    different(named())?;
+    let (mut lines, mut short) = (Vec::new(), Vec::new());
+    for (path, run) in named() {
+        let line = Progress::of(run, path)?;
+        match line.moments.len() {
+            0 | 1 => short.push(too_short(path, run, line.moments.len())),
+            _ => lines.push(line),
+        }
+    }
+    match short.first() {
+        Some(error) if lines.is_empty() => return Err(error.clone()),
+        _ => short
+            .iter()
+            .for_each(|error| session.observer.warning(&format!("{error}; left out"))),
+    }
+    let figure = plot::progress(&lines, &wanted.style);
+    Ok((figure, lines))
 }
 
 fn of_run(wanted: &PlotOptions, path: &Path) -> Result<Figure, Error> {

@@ -1,8 +1,8 @@
 //! `morphcog replay`: records a robot's rollout for pictures.
 
-use crate::analysis::dossier::check_length;
 use crate::base::error::Error;
 use crate::base::remedy::{Invocation, Remedy};
+use crate::base::stop::Stopped;
 use crate::body::Body;
 use crate::config::{Config, DataConfig};
 use crate::data::dataset::Split;
@@ -16,9 +16,10 @@ use crate::task::answer::Readout;
 use crate::task::class_names::ClassNames;
 use crate::task::protocol::RolloutMode;
 use crate::task::recording::{LabelledStimulus, Recording};
-use crate::task::rollout::record;
+use crate::task::rollout::{check_length, record_unless};
 use std::path::PathBuf;
 use std::str::FromStr;
+use std::sync::atomic::AtomicBool;
 
 /// Most images in one recording, since pictures hold every frame.
 pub(crate) const MAX_IMAGES: usize = 20;
@@ -87,13 +88,17 @@ pub(crate) struct ReplaySubject {
     pub(crate) names: ClassNames,
 }
 
-/// Records a robot's rollout under the protocol of its config.
+/// Records a robot's rollout under the protocol of its config, unless `stop` is set in the meantime.
 ///
 /// # Errors
-/// Returns an error if the robot, archive, images or data are wrong.
-pub fn replay(options: &ReplayOptions) -> Result<Replay, Error> {
-    let subject = subject(options)?;
-    let recording = record_subject(&subject);
+/// Returns an error if the robot, archive, images or data are wrong, or if `stop` was set.
+pub fn replay(options: &ReplayOptions, stop: &AtomicBool) -> Result<Replay, Error> {
+    Ok(replay_subject(subject(options)?, stop)?)
+}
+
+/// Acts as [`replay`] for a robot and images that were found.
+pub(crate) fn replay_subject(subject: ReplaySubject, stop: &AtomicBool) -> Result<Replay, Stopped> {
+    let recording = record_subject(&subject, stop)?;
     let FoundRobot {
         name,
         config,
@@ -128,7 +133,10 @@ pub fn replay(options: &ReplayOptions) -> Result<Replay, Error> {
     })
 }
 
-pub(crate) fn record_subject(subject: &ReplaySubject) -> Recording {
+pub(crate) fn record_subject(
+    subject: &ReplaySubject,
+    stop: &AtomicBool,
+) -> Result<Recording, Stopped> {
     let ReplaySubject {
         found:
             FoundRobot {
@@ -142,12 +150,13 @@ pub(crate) fn record_subject(subject: &ReplaySubject) -> Recording {
         names,
     } = subject;
     let fresh = config.protocol.rollout == RolloutMode::Fresh;
-    let recording = record(name, body, &config.physics, &config.protocol, fresh, images);
-    Recording {
+    let setting = (&config.physics, &config.protocol);
+    let recording = record_unless(name, body, setting, fresh, images, stop)?;
+    Ok(Recording {
         judge: judge.clone(),
         names: names.clone(),
         ..recording
-    }
+    })
 }
 
 pub(crate) fn subject(options: &ReplayOptions) -> Result<ReplaySubject, Error> {
@@ -236,7 +245,8 @@ pub(crate) fn subject(options: &ReplayOptions) -> Result<ReplaySubject, Error> {
         )?);
     }
     config.data.dataset = dataset.name().to_string();
-    check_length(config, images.len())?;
+    let body = [config.body.height, config.body.width];
+    check_length(body, &config.protocol, images.len())?;
     Ok(ReplaySubject {
         found,
         images,

@@ -10,12 +10,16 @@ use crate::body::Body;
 use crate::config::train::MOST_RANDOM_IMAGES;
 use crate::config::{Config, DataConfig, MAX_NUMBER};
 use crate::data::dataset::{Dataset, Split};
+#[cfg(feature = "figures")]
+use crate::draw::plot::{self, Style};
 use crate::images::whereabouts::{Whereabouts, load_dataset_of, say_transposed};
 use crate::response::gait::Gait;
 use crate::response::probing;
 use crate::response::probing::Probing;
 use crate::response::regression::RandomRollout;
 use crate::robots;
+#[cfg(feature = "figures")]
+use crate::robots::published;
 use crate::robots::selection::Selection;
 use crate::store::folder::{check_out, writable};
 use crate::store::images::DatasetRef;
@@ -31,6 +35,8 @@ use crate::task::perturbation::Condition;
 use crate::task::protocol::{Protocol, RolloutMode};
 use crate::training;
 use crate::training::prediction::Predictor;
+#[cfg(feature = "figures")]
+use std::path::Path;
 use std::path::PathBuf;
 
 /// Rollouts between two checks of the slopes' error, and fewest of a robot: ten under each of six
@@ -89,6 +95,24 @@ struct Provenance {
     sha256: String,
     dataset: DatasetRef,
     robots: Vec<(String, Body)>,
+}
+
+#[cfg(feature = "figures")]
+impl ResponseOutcome {
+    /// Draws the picture of each robot in all formats, and calls `drawn` with each file.
+    ///
+    /// # Errors
+    /// Returns an error if a picture cannot be drawn or written.
+    pub fn draw(&self, mut drawn: impl FnMut(&Path)) -> Result<(), Error> {
+        for (robot, paths) in self.file.robots.iter().zip(&self.pictures) {
+            let from = published::provenance(&self.called, self.file.run_seed);
+            let of = format!("robot {}, {from}", robot.id);
+            let task = self.file.setting.task.as_deref();
+            plot::response(robot, task, &of, &Style::default()).write(paths)?;
+            paths.iter().for_each(|path| drawn(path));
+        }
+        Ok(())
+    }
 }
 
 /// Measures the responses of robots and writes the results after each one, so that stopping keeps

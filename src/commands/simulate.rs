@@ -9,6 +9,7 @@ use crate::config::reading;
 use crate::sim::{Physics, Start, System, World};
 use crate::store::folder;
 use crate::task::protocol::{MAX_COLUMN, MAX_ROW, MAX_STEPS};
+use crate::task::rollout::place;
 use serde::de::{Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use std::fmt;
@@ -240,10 +241,7 @@ pub fn simulate(
     let physics = &scenario.physics;
     let start = scenario.start();
     let mut world = World::new(System::new(&scenario.body, physics.clone()), start);
-    let lengths = |[x, y]: [f64; 2]| {
-        let [x, y] = [x, y].map(|coordinate| coordinate / physics.cell_size);
-        [digits17(x), digits17(y - f64::from(physics.ground_row))]
-    };
+    let lengths = |at: [f64; 2]| place(at, physics).map(digits17);
     let stimuli = scenario.stimuli();
     let dark = Grid::filled(scenario.body.height(), scenario.body.width(), 0.0);
     let mut header = "step,com_x,com_y".to_string();

@@ -31,8 +31,10 @@ use crate::training::{self, check_groups, config_of, with_fitting_margin, with_i
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Default number of gaits to try: of one run, and of each of several.
-pub const GAITS: [usize; 2] = [4, 5];
+/// Default number of gaits to try of a single run.
+pub const GAITS_OF_ONE: usize = 4;
+/// Default number of gaits to try of each of several runs.
+pub const GAITS_OF_EACH: usize = 5;
 
 /// The gaits to train, the task, and the output folder.
 #[derive(Clone, Debug)]

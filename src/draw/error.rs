@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::remedy::Remedy;
+use crate::base::stop::Stopped;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
@@ -68,6 +69,9 @@ pub enum PictureError {
     /// The encoder of films took no more pictures, though it did not fail.
     #[error("the encoder of films ended early: {0}")]
     Pipe(std::io::Error),
+    /// Drawing was stopped.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
     /// The system has no threads left.
     #[error(transparent)]
     Threads(#[from] Error),
@@ -92,6 +96,7 @@ impl From<PictureError> for Error {
                 }
             }
             PictureError::Threads(error) => error,
+            PictureError::Stopped(stopped) => stopped.into(),
             PictureError::NoEncoder { .. } => Error::other(error.to_string())
                 .advice("install ffmpeg, or name it by MORPHCOG_FFMPEG")
                 .remedy(Remedy::WriteFrames),

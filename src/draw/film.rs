@@ -1,6 +1,7 @@
 //! [`Film`]: the pictures of a recording: one image's rollout after the other, or the same moment
 //! of all rollouts side by side.
 
+use crate::base::stop::{NEVER, check};
 use crate::base::threads::in_pool;
 use crate::draw::colour;
 use crate::draw::error::{PictureError, WIDTHS};
@@ -9,6 +10,7 @@ use crate::draw::scene::Look;
 use crate::draw::stage::Stage;
 use crate::draw::walk::Walk;
 use rayon::prelude::*;
+use std::sync::atomic::AtomicBool;
 use tiny_skia::{Pixmap, PixmapPaint, Transform};
 
 /// Line between pictures side by side, pixels.
@@ -77,6 +79,8 @@ pub(crate) struct Film<'a> {
     walk: &'a Walk<'a>,
     stage: Stage,
     side_by_side: bool,
+    /// Stops [`Film::each`] when set.
+    stop: &'a AtomicBool,
 }
 
 impl<'a> Film<'a> {
@@ -99,6 +103,7 @@ impl<'a> Film<'a> {
             walk,
             stage: Stage::new(walk, width)?.look(look),
             side_by_side,
+            stop: &NEVER,
         };
         let [width, height] = film.size();
         // A film keeps dozens of pictures in memory.
@@ -116,6 +121,11 @@ impl<'a> Film<'a> {
         Film::new(walk, options.width, options.look, options.side_by_side)
     }
 
+    /// Returns the same film, which stops when `stop` is set.
+    pub(crate) fn until(self, stop: &'a AtomicBool) -> Self {
+        Film { stop, ..self }
+    }
+
     /// Calls `show` with what `make` makes of each moment's picture, in order. Pictures are made in
     /// parallel, with few in memory.
     pub(crate) fn each<T: Send>(
@@ -125,6 +135,7 @@ impl<'a> Film<'a> {
         mut show: impl FnMut(&Moment, &T) -> Result<(), PictureError>,
     ) -> Result<(), PictureError> {
         for batch in moments.chunks(BATCH) {
+            check(self.stop)?;
             let pictures = || {
                 batch
                     .par_iter()

@@ -15,6 +15,7 @@ use crate::task::recording::Recording;
 use ::gif::{DisposalMethod, Encoder, Frame, Repeat};
 use rayon::prelude::*;
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 use tiny_skia::Pixmap;
 
 /// The number of frames sampled for the palette.
@@ -32,21 +33,31 @@ pub(crate) fn write(
     path: &Path,
     recording: &Recording,
     options: &FilmOptions,
+    stop: &AtomicBool,
 ) -> Result<(), PictureError> {
-    write_whole(path, &encode(recording, options)?)
+    write_whole(path, &encode(recording, options, stop)?)
 }
 
 /// Encodes a recording as an animated GIF that loops for ever.
 ///
 /// # Errors
-/// Returns a [`PictureError`] if the recording cannot be drawn with these options.
-pub fn encode(recording: &Recording, options: &FilmOptions) -> Result<Vec<u8>, PictureError> {
-    in_pool(|| encoded(recording, options))?
+/// Returns a [`PictureError`] if the recording cannot be drawn with these options, or if `stop` was
+/// set in the meantime.
+pub fn encode(
+    recording: &Recording,
+    options: &FilmOptions,
+    stop: &AtomicBool,
+) -> Result<Vec<u8>, PictureError> {
+    in_pool(|| encoded(recording, options, stop))?
 }
 
-fn encoded(recording: &Recording, options: &FilmOptions) -> Result<Vec<u8>, PictureError> {
+fn encoded(
+    recording: &Recording,
+    options: &FilmOptions,
+    stop: &AtomicBool,
+) -> Result<Vec<u8>, PictureError> {
     let walk = Walk::new(recording)?;
-    let film = Film::of(&walk, options)?.crisp();
+    let film = Film::of(&walk, options)?.crisp().until(stop);
     let moments = film.moments(options.every);
     let palette = palette(&film, &moments, COLOURS - 1)?;
     let tolerance = Tolerance::of(&palette);
@@ -250,6 +261,7 @@ impl Tolerance {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::stop::NEVER;
     use crate::draw::simulated;
 
     /// Decodes every frame of a GIF as a viewer displays it (RGB bytes), with its delay.
@@ -287,7 +299,8 @@ mod tests {
             ..FilmOptions::default()
         };
         let film = Film::new(&walk, 320, Look::Plain, false).unwrap().crisp();
-        let (width, height, repeat, frames) = decode(&encode(&recording, &options).unwrap());
+        let (width, height, repeat, frames) =
+            decode(&encode(&recording, &options, &NEVER).unwrap());
         let shown = film.moments(4);
         assert_eq!([width, height].map(u32::from), film.size());
         assert_eq!(repeat, Repeat::Infinite);
@@ -333,7 +346,7 @@ mod tests {
             hold: 0.5,
             ..FilmOptions::default()
         };
-        let (.., frames) = decode(&encode(&recording, &options).unwrap());
+        let (.., frames) = decode(&encode(&recording, &options, &NEVER).unwrap());
         let delays: Vec<u16> = frames.iter().map(|f| f.1).collect();
         assert_eq!(delays, [5, 5, 5, 50, 5, 5, 5, 50]);
         let thirds = FilmOptions {
@@ -343,7 +356,7 @@ mod tests {
             hold: 0.0,
             ..FilmOptions::default()
         };
-        let delays: Vec<u16> = decode(&encode(&recording, &thirds).unwrap())
+        let delays: Vec<u16> = decode(&encode(&recording, &thirds, &NEVER).unwrap())
             .3
             .iter()
             .map(|f| f.1)
@@ -362,9 +375,19 @@ mod tests {
             hold: f64::INFINITY,
             ..FilmOptions::default()
         };
-        assert_eq!(decode(&encode(&recording, &options).unwrap()).3.len(), 2);
+        assert_eq!(
+            decode(&encode(&recording, &options, &NEVER).unwrap())
+                .3
+                .len(),
+            2
+        );
         recording.frames.truncate(1);
-        assert_eq!(decode(&encode(&recording, &options).unwrap()).3.len(), 1);
+        assert_eq!(
+            decode(&encode(&recording, &options, &NEVER).unwrap())
+                .3
+                .len(),
+            1
+        );
     }
 
     #[test]
@@ -378,6 +401,11 @@ mod tests {
             every: 1,
             ..FilmOptions::default()
         };
-        assert_eq!(decode(&encode(&recording, &options).unwrap()).3.len(), 4);
+        assert_eq!(
+            decode(&encode(&recording, &options, &NEVER).unwrap())
+                .3
+                .len(),
+            4
+        );
     }
 }

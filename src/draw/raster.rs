@@ -20,9 +20,7 @@ const BEYOND: f64 = 8192.0;
 /// Returns a [`PictureError`] if the width is out of range, or the picture cannot be encoded.
 pub fn png(walk: &Walk, frame: usize, width: u32) -> Result<Vec<u8>, PictureError> {
     let picture = picture(walk, frame, &Stage::new(walk, width)?)?;
-    picture
-        .encode_png()
-        .map_err(|error| PictureError::Encode(error.to_string()))
+    png_bytes(&picture)
 }
 
 /// Renders the picture of a frame as opaque RGBA.

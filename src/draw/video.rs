@@ -3,6 +3,7 @@
 
 use crate::base::files;
 use crate::base::shell::{in_shell, quoted};
+use crate::base::stop::check;
 use crate::base::threads::in_pool;
 use crate::draw::error::PictureError;
 use crate::draw::film::{Film, FilmOptions};
@@ -13,6 +14,7 @@ use std::ffi::OsString;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::atomic::AtomicBool;
 use tiny_skia::Pixmap;
 
 /// The environment variable that names the encoder.
@@ -67,18 +69,19 @@ const COLOURS: [&str; 10] = [
     "tv",
 ];
 
-/// Writes a recording as a film.
+/// Writes a recording as a film, unless `stop` is set in the meantime.
 ///
 /// # Errors
-/// Returns an error if the recording cannot be drawn, the encoder cannot be started or fails, or the
-/// file cannot be written.
+/// Returns an error if the recording cannot be drawn, the encoder cannot be started or fails, the
+/// file cannot be written, or `stop` was set.
 pub(crate) fn write(
     path: &Path,
     container: Container,
     recording: &Recording,
     options: &FilmOptions,
+    stop: &AtomicBool,
 ) -> Result<(), PictureError> {
-    in_pool(|| encode(path, container, recording, options))?
+    in_pool(|| encode(path, container, recording, options, stop))?
 }
 
 fn encode(
@@ -86,9 +89,10 @@ fn encode(
     container: Container,
     recording: &Recording,
     options: &FilmOptions,
+    stop: &AtomicBool,
 ) -> Result<(), PictureError> {
     let walk = Walk::new(recording)?;
-    let film = Film::of(&walk, options)?;
+    let film = Film::of(&walk, options)?.until(stop);
     let program = std::env::var_os(VARIABLE).filter(|name| !name.is_empty());
     let program = program.unwrap_or_else(|| OsString::from("ffmpeg"));
     // The encoder writes elsewhere: whatever happens to it, no half of a film is left beside others.
@@ -131,7 +135,7 @@ fn encode(
         source,
     })?;
     let mut input = encoder.stdin.take().expect("its input is a pipe");
-    let shown = frames(&film, options, |picture| {
+    let shown = frames(&film, options, stop, |picture| {
         let rgb: Vec<u8> = picture
             .data()
             .chunks_exact(4)
@@ -140,7 +144,14 @@ fn encode(
         input.write_all(&rgb).map_err(PictureError::Pipe)
     });
     drop(input);
+    // Ctrl-C in a terminal reaches the encoder, too, which may fail by it.
+    let stopped = check(stop);
+    if stopped.is_err() {
+        // It has ended if it cannot be killed.
+        let _ = encoder.kill();
+    }
     let ended = encoder.wait();
+    stopped?;
     let failed = |how: String| PictureError::Encoder {
         program: program.to_string_lossy().into_owned(),
         how,
@@ -165,10 +176,11 @@ fn encode(
 }
 
 /// Calls `show` with every picture of the film, in order, at a constant rate: the last of a phase
-/// comes as often as it is to be held.
+/// comes as often as it is to be held. Ends soon after `stop` is set.
 fn frames(
     film: &Film,
     options: &FilmOptions,
+    stop: &AtomicBool,
     mut show: impl FnMut(&Pixmap) -> Result<(), PictureError>,
 ) -> Result<(), PictureError> {
     let held = (options.hold * options.fps).round().clamp(1.0, 3600.0) as usize;
@@ -177,7 +189,10 @@ fn frames(
         |picture| picture,
         |moment, picture| {
             let times = if moment.is_last { held } else { 1 };
-            (0..times).try_for_each(|_| show(picture))
+            (0..times).try_for_each(|_| {
+                check(stop)?;
+                show(picture)
+            })
         },
     )
 }
@@ -189,11 +204,13 @@ const NUMBERED: &str = "frame-%05d.png";
 /// complete.
 ///
 /// # Errors
-/// Returns an error if the recording cannot be drawn or the folder cannot be written.
+/// Returns an error if the recording cannot be drawn, the folder cannot be written, or `stop` was
+/// set in the meantime.
 pub(crate) fn write_frames(
     folder: &Path,
     recording: &Recording,
     options: &FilmOptions,
+    stop: &AtomicBool,
 ) -> Result<(), PictureError> {
     let failed = |source| PictureError::Write {
         path: folder.to_path_buf(),
@@ -215,9 +232,9 @@ pub(crate) fn write_frames(
     let temporary = builder.tempdir_in(above).map_err(failed)?;
     in_pool(|| {
         let walk = Walk::new(recording)?;
-        let film = Film::of(&walk, options)?;
+        let film = Film::of(&walk, options)?.until(stop);
         let mut number = 0;
-        frames(&film, options, |picture| {
+        frames(&film, options, stop, |picture| {
             number += 1;
             let path = temporary.path().join(format!("frame-{number:05}.png"));
             std::fs::write(path, png_bytes(picture)?).map_err(failed)

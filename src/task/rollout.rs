@@ -1,7 +1,9 @@
 //! Rollouts: from a body, a protocol and stimuli to displacements.
 
 use crate::base::Grid;
-use crate::base::stop::Stopped;
+use crate::base::error::Error;
+use crate::base::stop::{NEVER, Stopped};
+use crate::base::text::counted;
 use crate::body::Body;
 use crate::sim::{Energy, Physics, Start, StepError, System, Unstable, World, Worlds};
 use crate::task::class_names::ClassNames;
@@ -10,9 +12,20 @@ use crate::task::recording::{Frame, LabelledStimulus, Phase, Recording, VoxelCor
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+/// Most places of points in a recording: some gigabyte.
+const MOST_PLACES: usize = 50_000_000;
+
 /// Converts world units to voxel lengths, in which distances are reported, as in the paper.
-fn voxel_lengths(world_units: f64, physics: &Physics) -> f64 {
+pub(crate) fn voxel_lengths(world_units: f64, physics: &Physics) -> f64 {
     world_units / physics.cell_size
+}
+
+/// Converts a position in world units to voxel lengths, with y from the ground.
+pub fn place([x, y]: [f64; 2], physics: &Physics) -> [f64; 2] {
+    [
+        voxel_lengths(x, physics),
+        voxel_lengths(y, physics) - f64::from(physics.ground_row),
+    ]
 }
 
 /// A robot on the ground, ready for images.
@@ -205,6 +218,28 @@ pub(crate) fn same_to_sensors(body: &Body, stimuli: &[&Grid<f64>]) -> Vec<usize>
         .collect()
 }
 
+/// Checks that a recording of a body, which holds every point at every moment, is short enough.
+///
+/// # Errors
+/// Returns an error that says how many control steps are possible.
+pub fn check_length(
+    [rows, columns]: [usize; 2],
+    protocol: &Protocol,
+    images: usize,
+) -> Result<(), Error> {
+    let points = (rows + 1) * (columns + 1);
+    let most = MOST_PLACES / points / images.max(1);
+    let steps = protocol.control_steps;
+    match steps as usize > most {
+        true => Err(Error::input(format!(
+            "protocol.control_steps = {steps}: expected at most {most} to record a rollout under {}",
+            counted(images, "image", "images")
+        ))
+        .advice("show fewer images")),
+        false => Ok(()),
+    }
+}
+
 /// Records a robot's rollout frame by frame for pictures, with one phase for each image and no
 /// judge. An unstable rollout is recorded up to its end.
 pub fn record(
@@ -215,6 +250,22 @@ pub fn record(
     fresh: bool,
     images: &[LabelledStimulus],
 ) -> Recording {
+    record_unless(robot, body, (physics, protocol), fresh, images, &NEVER)
+        .expect("nothing sets its flag")
+}
+
+/// Acts as [`record`], unless `stop` is set in the meantime.
+///
+/// # Errors
+/// Returns [`Stopped`] if `stop` was set.
+pub fn record_unless(
+    robot: &str,
+    body: &Body,
+    (physics, protocol): (&Physics, &Protocol),
+    fresh: bool,
+    images: &[LabelledStimulus],
+    stop: &AtomicBool,
+) -> Result<Recording, Stopped> {
     let system = Arc::new(System::new(body, physics.clone()));
     let mut rollout = Rollout::new(&system, protocol);
     let mut recording = Recording {
@@ -239,7 +290,7 @@ pub fn record(
         let mut unstable = false;
         let mut displacement = rollout.moved();
         for _ in 0..protocol.control_steps {
-            unstable = rollout.step().is_err();
+            unstable = StepError::outcome(rollout.step_unless(stop))?.is_err();
             if unstable {
                 break;
             }
@@ -256,7 +307,7 @@ pub fn record(
             break;
         }
     }
-    recording
+    Ok(recording)
 }
 
 /// Records the start of a simulation and its present moment under a stimulus, for a picture.
@@ -289,14 +340,7 @@ pub fn moment(world: &World, body: &Body, stimulus: Grid<f64>) -> Recording {
 }
 
 fn frame(world: &World) -> Frame {
-    let physics = world.system().physics();
-    let ground = f64::from(physics.ground_row) * physics.cell_size;
-    let place = |[x, y]: [f64; 2]| {
-        [
-            voxel_lengths(x, physics),
-            voxel_lengths(y - ground, physics),
-        ]
-    };
+    let place = |at: [f64; 2]| place(at, world.system().physics());
     Frame {
         points: world.points().map(place).collect(),
         centre: place(world.centre_of_mass()),
@@ -387,6 +431,46 @@ mod tests {
         let live = |image| fresh_rollout(&system, &protocol, image, &NEVER).unwrap();
         assert_eq!(live(&images[1]), live(&images[3]));
         assert_ne!(live(&images[0]), live(&images[1]));
+    }
+
+    #[test]
+    fn a_recording_has_the_bits_of_its_rollout_and_none_if_it_is_stopped() {
+        let (protocol, physics) = (protocol(), Physics::default());
+        let seen = LabelledStimulus {
+            class: 0,
+            label: String::new(),
+            image: None,
+            stimulus: image(1.0, 0.0),
+        };
+        let images = [seen.clone(), seen];
+        let setting = (&physics, &protocol);
+        let recorded = |stop: &AtomicBool| record_unless("", &body(), setting, true, &images, stop);
+        let recording = recorded(&NEVER).unwrap();
+        let walked = fresh_rollout(&system(), &protocol, &image(1.0, 0.0), &NEVER).unwrap();
+        assert_eq!(
+            recording
+                .phases
+                .iter()
+                .map(|phase| phase.displacement)
+                .collect::<Vec<_>>(),
+            [walked; 2]
+        );
+        assert_eq!(recorded(&AtomicBool::new(true)).map(drop), Err(Stopped));
+    }
+
+    #[test]
+    fn recordings_that_would_fill_the_memory_are_refused_with_the_longest_possible() {
+        let steps = |control_steps| Protocol {
+            control_steps,
+            ..protocol()
+        };
+        let checked = |most, images| check_length([4, 9], &steps(most), images);
+        assert_eq!(checked(50_000, 20), Ok(()));
+        let error = checked(50_001, 20).unwrap_err().to_string();
+        assert!(
+            error.contains("at most 50000") && error.contains("20 images"),
+            "{error}"
+        );
     }
 
     #[test]

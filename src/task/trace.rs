@@ -7,7 +7,7 @@ use crate::base::stop::Stopped;
 use crate::body::Body;
 use crate::sim::{EnergyGauge, EnergyNow, Physics, Start, System, World, Worlds};
 use crate::task::protocol::Protocol;
-use crate::task::rollout::same_to_sensors;
+use crate::task::rollout::{place, same_to_sensors, voxel_lengths};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -136,7 +136,9 @@ fn side_by_side(
     let trace = |((world, ended), moments): ((&World, &Option<_>), Vec<Moment>)| {
         let moved = world.centre_of_mass()[0] - begin;
         Arc::new(Trace {
-            displacement: ended.is_none().then(|| moved / system.physics().cell_size),
+            displacement: ended
+                .is_none()
+                .then(|| voxel_lengths(moved, system.physics())),
             moments,
         })
     };
@@ -145,12 +147,7 @@ fn side_by_side(
 
 fn moment(world: &World, energy: EnergyNow) -> Moment {
     let physics = world.system().physics();
-    let lengths = |[x, y]: [f64; 2]| {
-        [
-            x / physics.cell_size,
-            y / physics.cell_size - f64::from(physics.ground_row),
-        ]
-    };
+    let lengths = |at: [f64; 2]| place(at, physics);
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     let (mut points, mut touching) = (0_u32, 0_u32);
     for point in world.points().map(lengths) {

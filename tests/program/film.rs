@@ -135,6 +135,69 @@ fn single_pictures_are_numbered_in_a_new_folder_with_the_line_that_makes_a_film(
 }
 
 #[test]
+fn frames_are_refused_before_the_simulation_where_something_is_in_the_way() {
+    let sandbox = with_run();
+    let again = |line: &str| {
+        let line = format!("replay -a run --every 9 {line}");
+        sandbox.run(&line).ended(5, &["frames: ", "--out"]);
+    };
+    replay(&sandbox, "unused", "-f frames").ended(0, &[]);
+    let before = names(&sandbox, "run");
+    again("-f frames");
+    again("-f gif,frames");
+    assert_eq!(names(&sandbox, "run"), before);
+    sandbox.write("walk-frames", "a file");
+    again("-f gif,frames -o walk");
+    sandbox.write("other-frames", "a file");
+    again("-f frames -o other-frames");
+    assert_eq!(sandbox.read("other-frames"), "a file");
+    assert!(!names(&sandbox, "").contains(&"walk.gif".to_string()));
+}
+
+/// Interrupts the program before it reads any picture, as Ctrl-C does.
+const INTERRUPTING: &str = "#!/bin/sh
+kill -INT $PPID
+cat > /dev/null
+for last; do :; done
+printf film > \"$last\"
+";
+
+#[test]
+fn a_stopped_replay_leaves_neither_a_film_nor_frames_behind() {
+    let sandbox = with_run();
+    let encoder = with_encoder(&sandbox, INTERRUPTING);
+    std::fs::create_dir(sandbox.path("temporary")).unwrap();
+    let before = names(&sandbox, "");
+    let command = |line: &str| {
+        let mut command = sandbox.command(format!("replay -a run -i 0 {line}").split(' '));
+        command.env("MORPHCOG_FFMPEG", &encoder);
+        command.env("TMPDIR", sandbox.path("temporary"));
+        command
+    };
+    said(command("-o walk.mp4")).ended(75, &["stopped"]);
+    assert_eq!(names(&sandbox, ""), before);
+    assert_eq!(names(&sandbox, "temporary"), [""; 0]);
+
+    let mut child = command("-o frames/ --width 4096").spawn().unwrap();
+    let has_begun = || {
+        let all = names(&sandbox, "");
+        let temporary = all.iter().find(|name| name.ends_with(".tmp"));
+        temporary.is_some_and(|name| !names(&sandbox, name).is_empty())
+    };
+    while !has_begun() {
+        assert!(child.try_wait().unwrap().is_none(), "it ended before");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    let pid = child.id().to_string();
+    let sent = std::process::Command::new("kill")
+        .args(["-INT", &pid])
+        .status();
+    assert!(sent.unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(75));
+    assert_eq!(names(&sandbox, ""), before);
+}
+
+#[test]
 fn ffmpeg_makes_a_film_and_takes_the_line_for_single_pictures() {
     let has = |name: &str| {
         std::process::Command::new(name)

@@ -3,6 +3,7 @@
 use crate::base::error::Error;
 use crate::base::number;
 use crate::base::remedy::Remedy;
+use crate::base::stop::check;
 use crate::cli::output::console::Console;
 use crate::cli::output::player;
 use crate::commands::replay::Replay;
@@ -15,8 +16,10 @@ use crate::draw::{gif, html, raster, video};
 use crate::shipped;
 use crate::store::folder;
 use std::fmt;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::atomic::AtomicBool;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Format {
@@ -116,7 +119,10 @@ impl PicturesWanted {
     }
 
     /// Chooses `replay-<name>.<format>` in a folder.
-    pub(crate) fn beside(folder: &Path, name: &str, formats: &[Format]) -> Self {
+    ///
+    /// # Errors
+    /// Returns an error if a file cannot be written there.
+    pub(crate) fn beside(folder: &Path, name: &str, formats: &[Format]) -> Result<Self, Error> {
         let file = |&format: &Format| {
             let ending = if format == Format::Frames { '-' } else { '.' };
             (
@@ -124,10 +130,22 @@ impl PicturesWanted {
                 folder.join(format!("replay-{name}{ending}{format}")),
             )
         };
-        PicturesWanted {
-            files: or_default(formats).iter().map(file).collect(),
-            ..PicturesWanted::default()
+        PicturesWanted::of(or_default(formats).iter().map(file).collect())
+    }
+
+    /// Checks that files can be written, before hours of simulation.
+    fn of(files: Vec<(Format, PathBuf)>) -> Result<Self, Error> {
+        for (format, path) in &files {
+            match format {
+                Format::Terminal => {}
+                Format::Frames => vacant(path)?,
+                _ => folder::writable(path)?,
+            }
         }
+        Ok(PicturesWanted {
+            files,
+            ..PicturesWanted::default()
+        })
     }
 
     /// Takes the format from a file's extension; without one, chooses a file for each of `formats`. A
@@ -135,15 +153,7 @@ impl PicturesWanted {
     pub(crate) fn named(path: &Path, formats: &[Format]) -> Result<Self, Error> {
         let is_folder = folder::check_is_file_path(path).is_err();
         if formats == [Format::Frames] || (formats.is_empty() && is_folder) {
-            let has_any = |mut entries: std::fs::ReadDir| entries.next().is_some();
-            if std::fs::read_dir(path).is_ok_and(has_any) {
-                let text = format!("{}: expected a new folder, or an empty one", path.display());
-                return Err(Error::occupied(text).remedy(Remedy::ChooseOut));
-            }
-            return Ok(PicturesWanted {
-                files: vec![(Format::Frames, path.to_path_buf())],
-                ..PicturesWanted::default()
-            });
+            return PicturesWanted::of(vec![(Format::Frames, path.to_path_buf())]);
         }
         folder::check_is_file_path(path)?;
         let files = match path
@@ -177,14 +187,25 @@ impl PicturesWanted {
                 vec![(format, path.to_path_buf())]
             }
         };
-        files
-            .iter()
-            .filter(|(format, _)| !matches!(format, Format::Terminal | Format::Frames))
-            .try_for_each(|(_, path)| folder::writable(path))?;
-        Ok(PicturesWanted {
-            files,
-            ..PicturesWanted::default()
-        })
+        PicturesWanted::of(files)
+    }
+}
+
+/// Checks that frames can be written as a folder: that there is none, or an empty one.
+fn vacant(folder: &Path) -> Result<(), Error> {
+    let is_vacant = match std::fs::read_dir(folder) {
+        Ok(mut entries) => entries.next().is_none(),
+        Err(error) => error.kind() == io::ErrorKind::NotFound,
+    };
+    match is_vacant {
+        true => Ok(()),
+        false => {
+            let text = format!(
+                "{}: expected a new folder, or an empty one",
+                folder.display()
+            );
+            Err(Error::occupied(text).remedy(Remedy::ChooseOut))
+        }
     }
 }
 
@@ -221,8 +242,9 @@ pub(crate) fn make(
     console: &Console,
     replay: &Replay,
     wanted: &PicturesWanted,
+    stop: &AtomicBool,
 ) -> Result<Vec<PathBuf>, Error> {
-    let made = write(console, replay, wanted)?;
+    let made = write(console, replay, wanted, stop)?;
     let recording = &replay.recording;
     for phase in &recording.phases {
         let way = if phase.displacement < 0.0 {
@@ -253,11 +275,13 @@ pub(crate) fn make(
     Ok(made)
 }
 
-/// Makes the pictures, the view in the terminal among them, and returns the files.
+/// Makes the pictures, the view in the terminal among them, and returns the files. If `stop` is set,
+/// the file that is being made is left out.
 pub(crate) fn write(
     console: &Console,
     replay: &Replay,
     wanted: &PicturesWanted,
+    stop: &AtomicBool,
 ) -> Result<Vec<PathBuf>, Error> {
     let failed = |error: PictureError| match error {
         PictureError::Size { .. } | PictureError::Large { .. } => {
@@ -270,17 +294,18 @@ pub(crate) fn write(
     let recording = &replay.recording;
     let title = format!("morphcog: robot {}", recording.robot);
     for (format, path) in &wanted.files {
+        check(stop)?;
         let options = wanted.film(*format);
         match format {
-            Format::Gif => gif::write(path, recording, &options).map_err(failed)?,
+            Format::Gif => gif::write(path, recording, &options, stop).map_err(failed)?,
             Format::Mp4 => {
-                video::write(path, Container::Mp4, recording, &options).map_err(failed)?;
+                video::write(path, Container::Mp4, recording, &options, stop).map_err(failed)?;
             }
             Format::Webm => {
-                video::write(path, Container::Webm, recording, &options).map_err(failed)?;
+                video::write(path, Container::Webm, recording, &options, stop).map_err(failed)?;
             }
             Format::Frames => {
-                video::write_frames(path, recording, &options).map_err(failed)?;
+                video::write_frames(path, recording, &options, stop).map_err(failed)?;
             }
             Format::Html => html::write(path, recording, &title, &replay.about).map_err(failed)?,
             Format::Png => {

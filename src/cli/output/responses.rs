@@ -1,13 +1,9 @@
-//! The results of `morphcog response`, and its pictures.
+//! The results of `morphcog response`.
 
 use crate::base::number;
 use crate::base::number::percent;
 use crate::cli::output::console::{Console, Mode};
 use crate::commands::response::ResponseOutcome;
-use crate::draw::error::PictureError;
-use crate::draw::plot;
-use crate::draw::plot::Style;
-use crate::robots::published;
 use crate::store::response::{EndedBy, RobotResponse};
 use std::path::Path;
 
@@ -119,27 +115,4 @@ fn row(robot: &RobotResponse, is_taught: bool, has_window: bool) -> Vec<String> 
         row.push(margin.map_or("–".to_string(), |margin| margin.to_string()));
     }
     row
-}
-
-/// Writes the pictures of the robots.
-pub(crate) fn pictures(console: &Console, finished: &ResponseOutcome) -> Result<(), PictureError> {
-    let ResponseOutcome {
-        file,
-        pictures,
-        called,
-        ..
-    } = finished;
-    for (robot, paths) in file.robots.iter().zip(pictures) {
-        let of = format!(
-            "robot {}, {}",
-            robot.id,
-            published::provenance(called, file.run_seed)
-        );
-        let task = file.setting.task.as_deref();
-        plot::response(robot, task, &of, &Style::default()).write(paths)?;
-        for path in paths {
-            console.line_about(path, &format!("wrote {}", path.display()));
-        }
-    }
-    Ok(())
 }

@@ -52,12 +52,12 @@ impl TasksSummary {
             let text = format!(
                 "{count_failed} of {count} tasks failed: {numbers}; {done} are done, {open} are open"
             );
-            return Err(Error::other(text).advice("the same command tries them again"));
+            return Err(Error::other(text).remedy(Remedy::Repeat));
         }
         if *open == 0 && *elsewhere > 0 {
             let text =
                 format!("{done} of {count} tasks are done; other processes are at {elsewhere}");
-            return Err(Error::occupied(text).advice("the same command does what they leave"));
+            return Err(Error::occupied(text).remedy(Remedy::Repeat));
         }
         if *open > 0 {
             let at = if *elsewhere > 0 {
