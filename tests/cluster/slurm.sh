@@ -62,7 +62,7 @@ EOF
   # The signal before a time limit of a minute. Slurm looks every 30 seconds, and sends it up to 30 seconds early: 15 to 45
   # seconds after the start. The run takes longer than that.
   mkdir limit
-  plan limit 1500
+  plan limit 2500
   morphcog sweep limit/plan.toml --set 'seeds=[1]' --out limit/runs --slurm > limit/job.sh
   sbatch --time=1 --signal=B:USR1@15 limit/job.sh
   # A task is killed, and the job is submitted again.
