@@ -15,6 +15,7 @@ mod report;
 mod reproduce;
 mod response;
 mod serve;
+mod site;
 mod sweep;
 mod tasks;
 mod team;
@@ -97,6 +98,7 @@ pub(crate) fn run(cli: Cli, console: &Console, ranks: Ranks) -> Result<(), Error
         Command::Plot(args) => plot::run(args, console),
         Command::Simulate(args) => run_simulate(&args, console),
         Command::Serve(args) => serve::run(args, console),
+        Command::Site(args) => site::run(&args, console),
         Command::Data { command } => run_data(command, console),
         Command::Gallery => published::gallery().map(|robots| summary::gallery(console, &robots)),
         Command::Config { name: None, .. } => {

@@ -13,6 +13,7 @@ pub mod ranks;
 pub mod remedy;
 pub mod session;
 pub(crate) mod shell;
+#[cfg(not(target_family = "wasm"))]
 pub(crate) mod signals;
 pub(crate) mod statistics;
 pub(crate) mod table;

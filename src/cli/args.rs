@@ -13,12 +13,14 @@ use crate::cli::report::ReportArgs;
 use crate::cli::reproduce::ReproduceArgs;
 use crate::cli::response::ResponseArgs;
 use crate::cli::serve::ServeArgs;
+use crate::cli::site::SiteArgs;
 use crate::cli::sweep::SweepArgs;
 use crate::cli::team::TeamArgs;
 use crate::cli::train::TrainArgs;
 use crate::cli::values::{MOST, decimal, held_out, offering, seed, threads, whole};
 use crate::cli::{
-    audit, capacity, compare, demo, plot, report, reproduce, response, serve, sweep, team, train,
+    audit, capacity, compare, demo, plot, report, reproduce, response, serve, site, sweep, team,
+    train,
 };
 use crate::commands::plan::PAPER_TOML;
 use crate::commands::replay::ShownImage;
@@ -195,6 +197,9 @@ Exit code 4 if the rollout becomes unstable.")]
     /// Draw a digit and watch robots walk, in the browser.
     #[command(after_help = serve::EXAMPLES)]
     Serve(ServeArgs),
+    /// Write the page as static files: anybody can open them, without the program.
+    #[command(after_help = site::EXAMPLES)]
+    Site(SiteArgs),
     /// Find, download and look at images.
     #[command(after_help = "\
 Examples:

@@ -63,10 +63,9 @@ pub(super) fn run(args: ServeArgs, console: &Console) -> Result<(), Error> {
         newest,
         data: args.data,
         runs: folder::RUNS.into(),
-        hosts,
     };
     let (service, notes) = Service::open(&options)?;
-    let server = Server::bind(service, args.port)?;
+    let server = Server::bind(service, hosts, args.port)?;
     choice::warn_of_versions(&shown, console);
     for note in notes {
         console.info(&format!("note: {note}"));

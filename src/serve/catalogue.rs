@@ -155,8 +155,9 @@ pub(crate) struct RobotCatalogue {
     built_in: Vec<Arc<Collection>>,
     /// The archives as of the last poll; locked only to copy or replace the list.
     known: Mutex<Arc<[Known]>>,
-    /// Locked during polls, which may take time; concurrent requests use the last list.
-    watch: Mutex<Watch>,
+    /// Locked during polls, which may take time; concurrent requests use the last list. `None`
+    /// without files to watch.
+    watch: Option<Mutex<Watch>>,
 }
 
 struct Watch {
@@ -180,11 +181,7 @@ impl RobotCatalogue {
         newest: Option<&Path>,
         runs: &Path,
     ) -> Result<(Self, Vec<String>), Error> {
-        let mut notes = Vec::new();
-        let zero_one = trained(gallery::ZERO_ONE, "Trained on thousands of images")?;
-        let team = trained(gallery::TEAM, "Ten digits: a robot for each pair")?;
-        let gates = trained(gallery::GATES, "Logic gates")?;
-        let built_in = [zero_one, published()?, team, gates].map(Arc::new).to_vec();
+        let (mut notes, built_in) = (Vec::new(), built_in()?);
         let mut watch = Watch {
             watched: Vec::new(),
             paths: HashSet::new(),
@@ -205,18 +202,27 @@ impl RobotCatalogue {
             RobotCatalogue {
                 built_in,
                 known: Mutex::new(watch.known()),
-                watch: Mutex::new(watch),
+                watch: Some(Mutex::new(watch)),
             },
             notes,
         ))
     }
 
+    /// Offers the built-in robots only.
+    pub(crate) fn shipped() -> Result<Self, Error> {
+        Ok(RobotCatalogue {
+            built_in: built_in()?,
+            known: Mutex::new(Arc::new([])),
+            watch: None,
+        })
+    }
+
     /// Returns the current archives, or the last known ones while another request polls.
     fn archives(&self) -> Arc<[Known]> {
-        let watch = match self.watch.try_lock() {
-            Ok(watch) => Some(watch),
-            Err(TryLockError::Poisoned(watch)) => Some(watch.into_inner()),
-            Err(TryLockError::WouldBlock) => None,
+        let watch = match self.watch.as_ref().map(Mutex::try_lock) {
+            Some(Ok(watch)) => Some(watch),
+            Some(Err(TryLockError::Poisoned(watch))) => Some(watch.into_inner()),
+            Some(Err(TryLockError::WouldBlock)) | None => None,
         };
         let is_due =
             |watch: &MutexGuard<Watch>| watch.looked.is_none_or(|at| at.elapsed() >= LOOK_EVERY);
@@ -428,6 +434,14 @@ impl Collection {
     }
 }
 
+/// Returns the robots that ship, the trained ones first.
+fn built_in() -> Result<Vec<Arc<Collection>>, Error> {
+    let zero_one = trained(gallery::ZERO_ONE, "Trained on thousands of images")?;
+    let team = trained(gallery::TEAM, "Ten digits: a robot for each pair")?;
+    let gates = trained(gallery::GATES, "Logic gates")?;
+    Ok([zero_one, published()?, team, gates].map(Arc::new).to_vec())
+}
+
 fn fittest_first(robots: &mut [Entry]) {
     robots.sort_by(|a, b| b.fitness.total_cmp(&a.fitness));
 }
@@ -549,7 +563,7 @@ mod tests {
 
     /// Polls again and returns the names of the archives' folders.
     fn known(catalogue: &RobotCatalogue) -> Vec<String> {
-        catalogue.watch.lock().unwrap().looked = None;
+        catalogue.watch.as_ref().unwrap().lock().unwrap().looked = None;
         let folder = |from: &CollectionSummary| {
             let path = PathBuf::from(from.path.clone()?);
             Some(path.parent()?.file_name()?.to_string_lossy().into_owned())
@@ -599,7 +613,7 @@ mod tests {
         let runs = tempfile::tempdir().unwrap();
         let (catalogue, _) = RobotCatalogue::open(&[], None, runs.path()).unwrap();
         write(runs.path(), "a", run());
-        let reads = catalogue.watch.lock().unwrap();
+        let reads = catalogue.watch.as_ref().unwrap().lock().unwrap();
         assert_eq!(
             (catalogue.list().len(), catalogue.collections().len()),
             (4, 4)

@@ -30,6 +30,18 @@ pub(crate) struct Request {
 }
 
 impl Request {
+    /// Makes a request that comes from the page itself.
+    pub(crate) fn new(method: &str, target: &str, body: &[u8]) -> Self {
+        let (path, query) = target.split_once('?').unwrap_or((target, ""));
+        Request {
+            method: method.to_string(),
+            path: path.to_string(),
+            query: query.to_string(),
+            headers: Vec::new(),
+            body: body.to_vec(),
+        }
+    }
+
     /// Returns a header's value, or `None` if it is missing. It refuses one that occurs more than
     /// once: one might pass the check and another take effect.
     pub(crate) fn header(&self, name: &str) -> Result<Option<&str>, HttpResponse> {
@@ -115,6 +127,11 @@ impl HttpResponse {
             allow: Some(allow),
             ..HttpResponse::refusal(405, &format!("expected {allow}"))
         }
+    }
+
+    /// Returns the status and the body.
+    pub(crate) fn into_parts(self) -> (u16, Vec<u8>) {
+        (self.status, self.body)
     }
 
     /// Sends the response; only the head if `head_only`, in answer to HEAD.

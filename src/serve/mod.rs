@@ -7,23 +7,24 @@ pub(crate) mod course;
 pub(crate) mod hosts;
 pub(crate) mod http;
 pub(crate) mod images;
+pub mod local;
 pub(crate) mod refusal;
 pub(crate) mod request;
 pub(crate) mod routes;
 pub mod server;
 pub(crate) mod simulation;
 pub mod simulations;
+#[cfg(feature = "gallery")]
+pub(crate) mod site;
 pub(crate) mod stream;
 pub(crate) mod team;
 
 use crate::base::error::Error;
-use crate::base::threads;
 use crate::body::Body;
 use crate::commands::simulate::Scenario;
 use crate::sim::{Physics, Start};
 use crate::task::protocol::Protocol;
 use catalogue::RobotCatalogue;
-use hosts::Hosts;
 use images::ImageSets;
 use refusal::HttpRefusal;
 use request::RolloutPlan;
@@ -42,8 +43,6 @@ pub struct ServeOptions {
     pub data: Option<PathBuf>,
     /// The folder whose runs appear on the page when they change.
     pub runs: PathBuf,
-    /// The names under which the page may be reached.
-    pub hosts: Hosts,
 }
 
 /// Everything that a page can request.
@@ -51,10 +50,6 @@ pub struct Service {
     pub(crate) catalogue: RobotCatalogue,
     pub(crate) images: ImageSets,
     pub(crate) simulations: Simulations,
-    /// The threads in which the robots of teams walk.
-    pub(crate) pool: rayon::ThreadPool,
-    /// The names under which the page may be reached.
-    pub(crate) hosts: Hosts,
 }
 
 /// The response to `/api/status`.
@@ -98,29 +93,38 @@ impl Service {
     /// missing or unreadable become notes.
     ///
     /// # Errors
-    /// Returns an error if an archive is invalid, or the system has no threads left.
+    /// Returns an error if an archive is invalid.
     pub fn open(options: &ServeOptions) -> Result<(Self, Vec<String>), Error> {
         let ServeOptions {
             archives,
             newest,
             data,
             runs,
-            hosts,
         } = options;
         let (catalogue, mut notes) = RobotCatalogue::open(archives, newest.as_deref(), runs)?;
         let (images, missing) = ImageSets::open(&catalogue, data.as_deref())?;
         notes.extend(missing);
-        let (simulations, pool) = (Simulations::default(), threads::pool(None)?);
-        Ok((
-            Service {
-                catalogue,
-                images,
-                simulations,
-                pool,
-                hosts: hosts.clone(),
-            },
-            notes,
-        ))
+        let service = Service {
+            catalogue,
+            images,
+            simulations: Simulations::default(),
+        };
+        Ok((service, notes))
+    }
+
+    /// Offers the robots that ship, and the images that the program draws.
+    ///
+    /// # Errors
+    /// Returns an error if the robots did not ship with this build.
+    pub(crate) fn shipped() -> Result<Self, Error> {
+        let catalogue = RobotCatalogue::shipped()?;
+        // What is missing are datasets to be downloaded.
+        let (images, _) = ImageSets::open(&catalogue, None)?;
+        Ok(Service {
+            catalogue,
+            images,
+            simulations: Simulations::default(),
+        })
     }
 
     pub(crate) fn status(&self) -> ServiceStatus {

@@ -19,9 +19,6 @@ pub(crate) enum Reply {
 }
 
 pub(crate) fn reply(service: &Service, request: &Request) -> Reply {
-    if let Err(refusal) = service.hosts.check(request) {
-        return Reply::Whole(refusal);
-    }
     let parts: Vec<&str> = request.path.split('/').skip(1).collect();
     let get = matches!(request.method.as_str(), "GET" | "HEAD");
     let post = request.method == "POST";

@@ -4,6 +4,7 @@ use crate::base::error::Error;
 use crate::base::remedy::Remedy;
 use crate::base::threads;
 use crate::serve::catalogue::Who;
+use crate::serve::hosts::Hosts;
 use crate::serve::http::HttpResponse;
 use crate::serve::routes::Reply;
 use crate::serve::simulation::{Gone, live};
@@ -26,15 +27,25 @@ const LOOK: Duration = Duration::from_millis(50);
 pub struct Server {
     listener: TcpListener,
     address: SocketAddr,
-    service: Arc<Service>,
+    site: Arc<Site>,
+}
+
+/// Everything that a connection needs.
+struct Site {
+    service: Service,
+    /// The names under which the page may be reached.
+    hosts: Hosts,
+    /// The threads in which the robots of teams walk.
+    pool: rayon::ThreadPool,
 }
 
 impl Server {
-    /// Binds a port that only this machine can reach; 0 means any free port.
+    /// Binds a port that only this machine can reach; 0 means any free port. `hosts` are the names
+    /// under which the page may be reached.
     ///
     /// # Errors
     /// Returns an error if the port is taken or the system refuses.
-    pub fn bind(service: Service, port: u16) -> Result<Self, Error> {
+    pub fn bind(service: Service, hosts: Hosts, port: u16) -> Result<Self, Error> {
         let refuse = |error: std::io::Error| match error.kind() {
             std::io::ErrorKind::AddrInUse => {
                 Error::occupied(format!("port {port} is taken by another program"))
@@ -47,7 +58,11 @@ impl Server {
         Ok(Server {
             listener,
             address,
-            service: Arc::new(service),
+            site: Arc::new(Site {
+                service,
+                hosts,
+                pool: threads::pool(None)?,
+            }),
         })
     }
 
@@ -64,27 +79,28 @@ impl Server {
         let Server {
             listener,
             address,
-            service,
+            site,
         } = self;
+        let simulations = &site.service.simulations;
         let ended = Arc::new(AtomicBool::new(false));
-        let (own, over) = (Arc::clone(&service), Arc::clone(&ended));
+        let (own, over) = (Arc::clone(&site), Arc::clone(&ended));
         threads::start("server", move || accept(&listener, &own, &over))?;
         while !stop.load(Ordering::Relaxed) {
             std::thread::sleep(LOOK);
         }
         ended.store(true, Ordering::Relaxed);
-        service.simulations.close();
+        simulations.close();
         // Wakes the accepting thread, so that it notices.
         drop(TcpStream::connect_timeout(&address, LOOK));
         let until = Instant::now() + TO_END;
-        while service.simulations.running() > 0 && Instant::now() < until {
+        while simulations.running() > 0 && Instant::now() < until {
             std::thread::sleep(Duration::from_millis(5));
         }
         Ok(())
     }
 }
 
-fn accept(listener: &TcpListener, service: &Arc<Service>, ended: &AtomicBool) {
+fn accept(listener: &TcpListener, site: &Arc<Site>, ended: &AtomicBool) {
     let connections = Arc::new(AtomicUsize::new(0));
     for stream in listener.incoming() {
         if ended.load(Ordering::Relaxed) {
@@ -104,11 +120,11 @@ fn accept(listener: &TcpListener, service: &Arc<Service>, ended: &AtomicBool) {
             continue;
         }
         let place = Place(Arc::clone(&connections));
-        let service = Arc::clone(service);
+        let site = Arc::clone(site);
         // If the system has no thread left, the connection closes and its slot is freed.
         let _ = threads::start("connection", move || {
             let _place = place;
-            connection(&service, &mut stream);
+            connection(&site, &mut stream);
         });
     }
 }
@@ -122,8 +138,13 @@ impl Drop for Place {
     }
 }
 
-fn connection(service: &Service, stream: &mut TcpStream) {
-    let (response, head_only) = match http::read(stream) {
+fn connection(site: &Site, stream: &mut TcpStream) {
+    let service = &site.service;
+    let read = http::read(stream).and_then(|request| match request {
+        Some(request) => site.hosts.check(&request).map(|()| Some(request)),
+        None => Ok(None),
+    });
+    let (response, head_only) = match read {
         Ok(None) => return,
         Err(refusal) => (refusal, false),
         Ok(Some(request)) => match routes::reply(service, &request) {
@@ -139,7 +160,7 @@ fn connection(service: &Service, stream: &mut TcpStream) {
             }
             Reply::Team(plan) => {
                 let lives = |slot: &Slot, tell: &mut Tell| {
-                    team::live(slot, &plan, &service.pool, |event| {
+                    team::live(slot, &plan, &site.pool, |event| {
                         tell(&stream::of_team(&event))
                     })
                 };

@@ -3,10 +3,11 @@
 use crate::serve::request::{MAX_STEPS, Pace, RolloutPlan, SeenPixels};
 use crate::serve::simulations::{Control, Slot};
 use crate::sim::{StepError, System};
-use crate::task::answer::{Reading, answer};
+use crate::task::answer::{Reading, Readout, answer};
 use crate::task::recording::{Frame, VoxelCorners};
 use crate::task::rollout::Rollout;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 /// Control steps per second of a robot's own time.
@@ -56,92 +57,175 @@ pub(crate) enum Event<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Gone;
 
-/// Runs a simulation and passes its events to `tell`; returns [`Gone`] as soon as that does.
+/// A simulation that the page watches, control step by control step.
+pub(crate) struct Walk {
+    rollout: Rollout,
+    judge: Option<Readout>,
+    /// Number of control steps per image.
+    shown_for: u32,
+    /// The control steps done.
+    pub(crate) step: u32,
+    /// The last control step with the present image.
+    pub(crate) until: u32,
+}
+
+/// Moments that a walk has gone through, and its end if it has ended.
+pub(crate) struct Moments {
+    pub(crate) frames: Vec<Frame>,
+    /// The answer at the last of the moments.
+    pub(crate) answer: Reading,
+    pub(crate) end: Option<End>,
+}
+
+/// The reason for the end of a walk.
+pub(crate) enum End {
+    /// The image was shown to the last control step, or the walk was stopped.
+    Over,
+    Unstable(String),
+}
+
+impl Walk {
+    /// Begins a walk, at rest.
+    pub(crate) fn new(plan: &RolloutPlan) -> Self {
+        let who = &plan.who;
+        let system = Arc::new(System::new(&who.body, who.physics.clone()));
+        let mut rollout = Rollout::new(&system, &who.protocol);
+        rollout.look_at(&plan.seen.stimulus);
+        Walk {
+            rollout,
+            judge: who.judge.clone(),
+            shown_for: who.protocol.control_steps,
+            step: 0,
+            until: who.protocol.control_steps,
+        }
+    }
+
+    /// Returns the event of a walk that has just begun.
+    pub(crate) fn begins<'a>(&self, id: u64, plan: &'a RolloutPlan) -> Event<'a> {
+        Event::Begin {
+            id,
+            plan,
+            voxels: self.rollout.voxels(),
+            frame: self.rollout.frame(),
+        }
+    }
+
+    /// Shows another image from now on.
+    pub(crate) fn look_at<'a>(&mut self, seen: &'a SeenPixels) -> Event<'a> {
+        self.rollout.look_at(&seen.stimulus);
+        self.until = (self.step + self.shown_for).min(MAX_STEPS);
+        Event::Seen {
+            step: self.step,
+            until: self.until,
+            seen,
+        }
+    }
+
+    pub(crate) fn answer(&self) -> Reading {
+        answer(self.judge.as_ref(), self.rollout.moved())
+    }
+
+    /// Simulates up to `due` control steps, fewer if `enough` says so after one of them. A walk ends
+    /// in the middle of a control step if `stop` is set.
+    pub(crate) fn advance(
+        &mut self,
+        due: u32,
+        stop: &AtomicBool,
+        mut enough: impl FnMut() -> bool,
+    ) -> Moments {
+        let (mut frames, mut end) = (Vec::new(), None);
+        let mut moved = self.rollout.moved();
+        for _ in 0..due.min(self.until - self.step) {
+            match self.rollout.step_unless(stop) {
+                Ok(()) => {}
+                Err(StepError::Stopped(_)) => {
+                    end = Some(End::Over);
+                    break;
+                }
+                Err(StepError::Unstable(unstable)) => {
+                    end = Some(End::Unstable(unstable.to_string()));
+                    break;
+                }
+            }
+            moved = self.rollout.moved();
+            self.step += 1;
+            frames.push(self.rollout.frame());
+            if enough() {
+                break;
+            }
+        }
+        if end.is_none() && self.step >= self.until {
+            end = Some(End::Over);
+        }
+        Moments {
+            frames,
+            answer: answer(self.judge.as_ref(), moved),
+            end,
+        }
+    }
+}
+
+impl Moments {
+    /// Passes on what has happened up to a control step; returns true if the walk has ended.
+    pub(crate) fn report<E>(
+        &self,
+        step: u32,
+        mut tell: impl FnMut(Event) -> Result<(), E>,
+    ) -> Result<bool, E> {
+        if !self.frames.is_empty() {
+            tell(Event::Moments {
+                step,
+                frames: &self.frames,
+                answer: self.answer.clone(),
+            })?;
+        }
+        let unstable = match &self.end {
+            None => return Ok(false),
+            Some(End::Over) => None,
+            Some(End::Unstable(reason)) => Some(reason.clone()),
+        };
+        tell(Event::End {
+            step,
+            answer: self.answer.clone(),
+            unstable,
+        })?;
+        Ok(true)
+    }
+}
+
+/// Runs a simulation at its pace and passes its events to `tell`; returns [`Gone`] as soon as that
+/// does.
 pub(crate) fn live(
     slot: &Slot,
     plan: &RolloutPlan,
     mut tell: impl FnMut(Event) -> Result<(), Gone>,
 ) -> Result<(), Gone> {
-    let who = &plan.who;
-    let judge = who.judge.as_ref();
-    let system = Arc::new(System::new(&who.body, who.physics.clone()));
-    let mut rollout = Rollout::new(&system, &who.protocol);
-    rollout.look_at(&plan.seen.stimulus);
-    tell(Event::Begin {
-        id: slot.id,
-        plan,
-        voxels: rollout.voxels(),
-        frame: rollout.frame(),
-    })?;
-    let shown_for = who.protocol.control_steps;
-    let (mut step, mut until) = (0, shown_for);
+    let mut walk = Walk::new(plan);
+    tell(walk.begins(slot.id, plan))?;
     let mut clock = Clock::new(plan.pace);
-    let mut frames = Vec::new();
     loop {
         let news = slot.control.news();
         if let Some(seen) = &news.seen {
-            rollout.look_at(&seen.stimulus);
-            until = (step + shown_for).min(MAX_STEPS);
-            tell(Event::Seen { step, until, seen })?;
+            tell(walk.look_at(seen))?;
         }
         clock.set(news.pace, news.paused);
-        if news.end || step >= until {
+        if news.end {
             return tell(Event::End {
-                step,
-                answer: answer(judge, rollout.moved()),
+                step: walk.step,
+                answer: walk.answer(),
                 unstable: None,
             });
         }
-        let due = match clock.due(step) {
-            Some(due) => due.min(until - step),
-            None => {
-                tell(Event::Still)?;
-                slot.control.wait(HEARTBEAT);
-                continue;
-            }
+        let Some(due) = clock.due(walk.step) else {
+            tell(Event::Still)?;
+            slot.control.wait(HEARTBEAT);
+            continue;
         };
-        frames.clear();
+        // Large bodies are reported in parts, to stay live.
         let begin = Instant::now();
-        for _ in 0..due {
-            let before = rollout.moved();
-            match rollout.step_unless(&slot.control.over) {
-                Ok(()) => {}
-                Err(StepError::Stopped(_)) => {
-                    return tell(Event::End {
-                        step,
-                        answer: answer(judge, before),
-                        unstable: None,
-                    });
-                }
-                Err(StepError::Unstable(unstable)) => {
-                    let answer = answer(judge, before);
-                    if !frames.is_empty() {
-                        tell(Event::Moments {
-                            step,
-                            frames: &frames,
-                            answer: answer.clone(),
-                        })?;
-                    }
-                    return tell(Event::End {
-                        step,
-                        answer,
-                        unstable: Some(unstable.to_string()),
-                    });
-                }
-            }
-            step += 1;
-            frames.push(rollout.frame());
-            // Large bodies are reported in parts, to stay live.
-            if begin.elapsed() > MOST_AT_ONCE {
-                break;
-            }
-        }
-        if !frames.is_empty() {
-            tell(Event::Moments {
-                step,
-                frames: &frames,
-                answer: answer(judge, rollout.moved()),
-            })?;
+        let moments = walk.advance(due, &slot.control.over, || begin.elapsed() > MOST_AT_ONCE);
+        if moments.report(walk.step, &mut tell)? {
+            return Ok(());
         }
         clock.sleep(&slot.control);
     }

@@ -53,19 +53,18 @@ pub(crate) fn of_team(event: &TeamEvent) -> String {
             classes,
             stands,
         } => {
-            let member = |((name, who, _), (voxels, frame)): (
-                &(Name, Who, SeenPixels),
-                &(Vec<VoxelCorners>, Frame),
-            )| {
-                json!({
+            type Stand = Option<(Vec<VoxelCorners>, Frame)>;
+            let member = |((name, who, _), stand): (&(Name, Who, SeenPixels), &Stand)| {
+                let (voxels, frame) = stand.as_ref()?;
+                Some(json!({
                     "name": name,
                     "body": who.body.to_string(),
                     "voxels": corners(&who.body, voxels),
                     "points": frame.points.len(),
                     "frames": positions(std::slice::from_ref(frame)),
-                })
+                }))
             };
-            let members: Vec<Value> = plan.members.iter().zip(stands).map(member).collect();
+            let members: Vec<Option<Value>> = plan.members.iter().zip(stands).map(member).collect();
             let seen = looks(0, plan.control_steps, &plan.together);
             let mut words = json!({
                 "id": id, "unit": STEPS, "rate": STEPS_PER_SECOND, "threshold": THRESHOLD, "until": plan.control_steps,

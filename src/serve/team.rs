@@ -18,6 +18,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 const LEAST: usize = 2;
 
@@ -177,12 +178,12 @@ pub(crate) enum TeamEvent<'a> {
         id: u64,
         plan: &'a TeamPlan,
         classes: &'a [u8],
-        /// Each robot's voxels and initial pose.
-        stands: Vec<(Vec<VoxelCorners>, Frame)>,
+        /// Each robot's voxels and initial pose; `None` for one that walks elsewhere.
+        stands: Vec<Option<(Vec<VoxelCorners>, Frame)>>,
     },
     Moment {
         step: u32,
-        /// Each robot's pose; `None` for one that has become unstable.
+        /// Each robot's pose; `None` for one that has become unstable, or walks elsewhere.
         frames: Vec<Option<Frame>>,
         tally: Tally,
     },
@@ -193,9 +194,136 @@ pub(crate) enum TeamEvent<'a> {
     },
 }
 
-struct Walker<'a> {
-    rollout: Rollout<'a>,
+/// A team whose robots walk side by side, control step by control step.
+pub(crate) struct TeamWalk {
+    /// The robots by their numbers; `None` for one that walks elsewhere.
+    walkers: Vec<Option<Walker>>,
+    judges: Vec<Readout>,
+    classes: Vec<u8>,
+    /// The control steps done.
+    pub(crate) step: u32,
+    until: u32,
+}
+
+/// A robot of a team.
+pub(crate) struct Walker {
+    rollout: Rollout,
     is_unstable: bool,
+}
+
+impl Walker {
+    /// Simulates control steps, unless `stop` is set or the robot becomes unstable.
+    fn walk(&mut self, due: u32, stop: &AtomicBool) {
+        for _ in 0..due {
+            match self.rollout.step_unless(stop) {
+                Ok(()) => {}
+                Err(StepError::Unstable(_)) => {
+                    self.is_unstable = true;
+                    return;
+                }
+                Err(StepError::Stopped(_)) => return,
+            }
+        }
+    }
+}
+
+impl TeamWalk {
+    /// Begins the walk of the robots whose numbers `walks_here` accepts, at rest.
+    pub(crate) fn new(plan: &TeamPlan, walks_here: impl Fn(usize) -> bool) -> Self {
+        let walker = |(number, (_, who, seen)): (usize, &(Name, Who, SeenPixels))| {
+            walks_here(number).then(|| {
+                let system = Arc::new(System::new(&who.body, who.physics.clone()));
+                let mut rollout = Rollout::new(&system, &who.protocol);
+                rollout.look_at(&seen.stimulus);
+                Walker {
+                    rollout,
+                    is_unstable: false,
+                }
+            })
+        };
+        let judges: Vec<Readout> = plan
+            .members
+            .iter()
+            .map(|(name, _, _)| name.judge.clone())
+            .collect();
+        TeamWalk {
+            walkers: plan.members.iter().enumerate().map(walker).collect(),
+            classes: classes(&judges),
+            judges,
+            step: 0,
+            until: plan.control_steps,
+        }
+    }
+
+    /// Returns the event of a walk that has just begun.
+    pub(crate) fn begins<'a>(&'a self, id: u64, plan: &'a TeamPlan) -> TeamEvent<'a> {
+        let stand = |walker: &Option<Walker>| {
+            let rollout = &walker.as_ref()?.rollout;
+            Some((rollout.voxels(), rollout.frame()))
+        };
+        TeamEvent::Begin {
+            id,
+            plan,
+            classes: &self.classes,
+            stands: self.walkers.iter().map(stand).collect(),
+        }
+    }
+
+    /// Simulates up to `due` control steps. `each` applies a function to all robots, perhaps in
+    /// parallel.
+    pub(crate) fn advance(
+        &mut self,
+        due: u32,
+        stop: &AtomicBool,
+        each: impl FnOnce(&mut [Option<Walker>], &(dyn Fn(&mut Option<Walker>) + Sync)),
+    ) {
+        let due = due.min(self.until - self.step);
+        each(&mut self.walkers, &|walker| match walker {
+            Some(walker) if !walker.is_unstable => walker.walk(due, stop),
+            _ => {}
+        });
+        self.step += due;
+    }
+
+    pub(crate) fn is_over(&self) -> bool {
+        self.step >= self.until
+    }
+
+    /// Returns the event of the present moment.
+    pub(crate) fn moment(&self) -> TeamEvent<'static> {
+        let frame = |walker: &Option<Walker>| walker.as_ref()?.place(Rollout::frame);
+        TeamEvent::Moment {
+            step: self.step,
+            frames: self.walkers.iter().map(frame).collect(),
+            tally: self.tally(),
+        }
+    }
+
+    /// Returns the event of the end.
+    pub(crate) fn ends(&self) -> TeamEvent<'static> {
+        TeamEvent::End {
+            step: self.step,
+            tally: self.tally(),
+        }
+    }
+
+    fn tally(&self) -> Tally {
+        let moved = |walker: &Option<Walker>| walker.as_ref()?.place(Rollout::moved);
+        self.tally_of(self.walkers.iter().map(moved).collect())
+    }
+
+    /// Counts the votes if the robots have moved so far \[voxel lengths\]; `None` is unstable.
+    pub(crate) fn tally_of(&self, moved: Vec<Option<f64>>) -> Tally {
+        let judges: Vec<&Readout> = self.judges.iter().collect();
+        Tally::of(&self.classes, &judges, moved, (THRESHOLD, CLIP))
+    }
+}
+
+impl Walker {
+    /// Returns what a stable rollout says of its place.
+    fn place<T>(&self, of: impl FnOnce(&Rollout) -> T) -> Option<T> {
+        (!self.is_unstable).then(|| of(&self.rollout))
+    }
 }
 
 /// Runs a team's walk, its robots in parallel in a pool, and passes its events to `tell`.
@@ -205,93 +333,31 @@ pub(crate) fn live(
     pool: &rayon::ThreadPool,
     mut tell: impl FnMut(TeamEvent) -> Result<(), Gone>,
 ) -> Result<(), Gone> {
-    let systems: Vec<Arc<System>> = plan
-        .members
-        .iter()
-        .map(|(_, who, _)| Arc::new(System::new(&who.body, who.physics.clone())))
-        .collect();
-    let mut walkers: Vec<Walker> = Vec::new();
-    for ((_, who, seen), system) in plan.members.iter().zip(&systems) {
-        let mut rollout = Rollout::new(system, &who.protocol);
-        rollout.look_at(&seen.stimulus);
-        walkers.push(Walker {
-            rollout,
-            is_unstable: false,
-        });
-    }
-    let judges: Vec<&Readout> = plan
-        .members
-        .iter()
-        .map(|(name, _, _)| &name.judge)
-        .collect();
-    let classes = classes(judges.iter().copied());
-    let stands = walkers
-        .iter()
-        .map(|walker| (walker.rollout.voxels(), walker.rollout.frame()))
-        .collect();
-    tell(TeamEvent::Begin {
-        id: slot.id,
-        plan,
-        classes: &classes,
-        stands,
-    })?;
+    let mut walk = TeamWalk::new(plan, |_| true);
+    tell(walk.begins(slot.id, plan))?;
     let mut clock = Clock::new(plan.pace);
-    let mut step = 0;
     loop {
         let news = slot.control.news();
         clock.set(news.pace, news.paused);
-        if news.end || step >= plan.control_steps {
-            return tell(TeamEvent::End {
-                step,
-                tally: tally(&walkers, &judges, &classes),
-            });
+        if news.end || walk.is_over() {
+            return tell(walk.ends());
         }
-        let Some(due) = clock.due(step) else {
+        let Some(due) = clock.due(walk.step) else {
             tell(TeamEvent::Still)?;
             slot.control.wait(HEARTBEAT);
             continue;
         };
-        let due = due.min(plan.control_steps - step);
         if due > 0 {
-            let over = &slot.control.over;
-            let walks = |walker: &mut Walker| {
-                for _ in 0..due {
-                    if let Err(StepError::Unstable(_)) = walker.rollout.step_unless(over) {
-                        walker.is_unstable = true;
-                    }
-                    if walker.is_unstable || slot.control.is_over() {
-                        return;
-                    }
-                }
-            };
-            pool.install(|| {
-                walkers
-                    .par_iter_mut()
-                    .filter(|walker| !walker.is_unstable)
-                    .for_each(walks);
+            walk.advance(due, &slot.control.over, |walkers, walk| {
+                pool.install(|| walkers.par_iter_mut().for_each(walk));
             });
             if slot.control.is_over() {
                 continue;
             }
-            step += due;
-            let frame = |walker: &Walker| (!walker.is_unstable).then(|| walker.rollout.frame());
-            let frames = walkers.iter().map(frame).collect();
-            tell(TeamEvent::Moment {
-                step,
-                frames,
-                tally: tally(&walkers, &judges, &classes),
-            })?;
+            tell(walk.moment())?;
         }
         clock.sleep(&slot.control);
     }
-}
-
-fn tally(walkers: &[Walker], judges: &[&Readout], classes: &[u8]) -> Tally {
-    let moved = walkers
-        .iter()
-        .map(|walker| (!walker.is_unstable).then(|| walker.rollout.moved()))
-        .collect();
-    Tally::of(classes, judges, moved, (THRESHOLD, CLIP))
 }
 
 #[cfg(test)]

@@ -55,8 +55,9 @@ macro_rules! tasks {
     };
 }
 
+/// Runs provided at run time, where none ship.
 #[cfg(not(feature = "gallery"))]
-const SETS: &[Set] = &[];
+static PROVIDED: std::sync::OnceLock<Vec<Set>> = std::sync::OnceLock::new();
 
 /// All shipped runs. Those of a set are numbered by their seeds, or named after their digits.
 #[cfg(feature = "gallery")]
@@ -92,8 +93,65 @@ const SETS: &[Set] = &[
     (GATES, &[files!(GATES, "gates", "run.json" "audit.json")]),
 ];
 
+/// Returns all runs that there are by name.
+fn sets() -> &'static [Set] {
+    #[cfg(feature = "gallery")]
+    return SETS;
+    #[cfg(not(feature = "gallery"))]
+    PROVIDED.get().map_or(&[], Vec::as_slice)
+}
+
+/// A set of runs with the texts of their files, as [`exported`] passes it to [`provide`].
+type Exported = (String, Vec<(String, Vec<(String, String)>)>);
+
+/// Encodes what the static page needs of the shipped runs: robots, and their audits.
+#[cfg(feature = "gallery")]
+pub(crate) fn exported() -> String {
+    let is_needed = |file: &str| ["run.json", "audit.json"].contains(&file);
+    let run = |(name, files): &Run| {
+        let files = files.iter().filter(|(file, _)| is_needed(file));
+        let files = files.map(|(file, text)| (file.to_string(), text.to_string()));
+        (name.to_string(), files.collect())
+    };
+    // Gaits have no task, so the page does not offer them.
+    let sets = SETS.iter().filter(|(set, _)| *set != GAITS);
+    let sets = sets.map(|(set, runs)| (set.to_string(), runs.iter().map(run).collect()));
+    let sets: Vec<Exported> = sets.collect();
+    serde_json::to_string(&sets).expect("JSON has all of it")
+}
+
+/// Provides the runs that [`exported`] encoded, for as long as the program runs, where none ship.
+/// Later calls change nothing.
+///
+/// # Errors
+/// Returns the reason if the text is something else.
+#[cfg(feature = "serve")]
+pub(crate) fn provide(text: &str) -> Result<(), String> {
+    let sets: Vec<Exported> = serde_json::from_str(text).map_err(|error| error.to_string())?;
+    #[cfg(not(feature = "gallery"))]
+    PROVIDED.get_or_init(|| sets.into_iter().map(kept).collect());
+    #[cfg(feature = "gallery")]
+    drop(sets);
+    Ok(())
+}
+
+/// Keeps a set for as long as the program runs.
+#[cfg(not(feature = "gallery"))]
+fn kept((name, runs): Exported) -> Set {
+    let leak = |text: String| -> &'static str { text.leak() };
+    let run = |(name, files): (String, Vec<(String, String)>)| {
+        let files: Vec<_> = files
+            .into_iter()
+            .map(|(name, text)| (leak(name), leak(text)))
+            .collect();
+        (leak(name), &*files.leak())
+    };
+    let runs: Vec<Run> = runs.into_iter().map(run).collect();
+    (leak(name), &*runs.leak())
+}
+
 pub(crate) fn text(name: &str, file: &str) -> Option<&'static str> {
-    let (_, files) = SETS
+    let (_, files) = sets()
         .iter()
         .flat_map(|(_, runs)| *runs)
         .find(|(run, _)| *run == name)?;
@@ -108,7 +166,7 @@ pub(crate) fn runs(name: &str) -> Result<Vec<PathBuf>, String> {
     if name == PUBLISHED {
         return Ok(vec![Path::new(PUBLISHED).join("run.json")]);
     }
-    runs_of(SETS, name)
+    runs_of(sets(), name)
 }
 
 fn runs_of(sets: &[Set], name: &str) -> Result<Vec<PathBuf>, String> {

@@ -11,7 +11,6 @@ use crate::base::ownership::{Lost, Ownership};
 use crate::base::session::Session;
 use crate::base::stop::Stopped;
 use crate::base::threads;
-use gethostname::gethostname;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -46,6 +45,14 @@ pub(crate) struct Holder {
     /// The heartbeat counter, which starts at the current time \[ns\]. Processes in containers may
     /// share numbers and machine names.
     pub(crate) beats: u64,
+}
+
+/// Returns the name of this machine; a browser has none.
+fn host_name() -> String {
+    #[cfg(not(target_family = "wasm"))]
+    return gethostname::gethostname().to_string_lossy().into_owned();
+    #[cfg(target_family = "wasm")]
+    String::new()
 }
 
 impl std::fmt::Display for Holder {
@@ -161,7 +168,7 @@ impl Lock {
             .write(true)
             .open(path)?;
         let is_locked = lock(&file, policy)?;
-        let host = gethostname().to_string_lossy().into_owned();
+        let host = host_name();
         if let Some(before) = read(path)? {
             // A process of this machine that no longer holds the system's lock has ended.
             let has_ended = is_locked && before.host == host;
@@ -377,7 +384,7 @@ pub(crate) fn state(path: &Path) -> io::Result<LockState> {
     let Some(holder) = holder else {
         return Ok(LockState::Free);
     };
-    let is_here = holder.host == gethostname().to_string_lossy();
+    let is_here = holder.host == host_name();
     let beaten = file.metadata()?.modified()?;
     // If the other machine's clock is ahead, no time has passed.
     let silent = SystemTime::now().duration_since(beaten).unwrap_or_default();
@@ -463,7 +470,7 @@ mod tests {
     }
 
     fn own() -> Holder {
-        let host = gethostname().to_string_lossy().into_owned();
+        let host = host_name();
         Holder {
             host,
             process: std::process::id(),
@@ -556,7 +563,7 @@ mod tests {
     fn with_locks_a_process_that_ended_here_is_no_reason_to_wait() {
         let folder = tempfile::tempdir().unwrap();
         let path = path(&folder);
-        let host = gethostname().to_string_lossy().into_owned();
+        let host = host_name();
         std::fs::write(&path, "").unwrap();
         write(
             &path,

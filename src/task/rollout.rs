@@ -29,16 +29,17 @@ pub fn place([x, y]: [f64; 2], physics: &Physics) -> [f64; 2] {
 }
 
 /// A robot on the ground, ready for images.
-pub struct Rollout<'a> {
+pub struct Rollout {
     world: World,
-    protocol: &'a Protocol,
+    /// Number of control steps per image.
+    control_steps: u32,
     /// Centre of mass along x at the start of the current image \[world units\].
     begin: f64,
 }
 
-impl<'a> Rollout<'a> {
+impl Rollout {
     /// Makes a robot at its start.
-    pub fn new(system: &Arc<System>, protocol: &'a Protocol) -> Self {
+    pub fn new(system: &Arc<System>, protocol: &Protocol) -> Self {
         let start = Start {
             column: protocol.start_column,
             row: protocol.start_row,
@@ -47,7 +48,7 @@ impl<'a> Rollout<'a> {
         Rollout {
             begin: world.centre_of_mass()[0],
             world,
-            protocol,
+            control_steps: protocol.control_steps,
         }
     }
 
@@ -67,7 +68,7 @@ impl<'a> Rollout<'a> {
         mut watch: impl FnMut(&World),
     ) -> Result<f64, Unstable> {
         self.look_at(stimulus);
-        for _ in 0..self.protocol.control_steps {
+        for _ in 0..self.control_steps {
             self.step()?;
             watch(&self.world);
         }
@@ -81,7 +82,7 @@ impl<'a> Rollout<'a> {
         stop: &AtomicBool,
     ) -> Result<f64, StepError> {
         self.look_at(stimulus);
-        for _ in 0..self.protocol.control_steps {
+        for _ in 0..self.control_steps {
             self.step_unless(stop)?;
         }
         Ok(self.moved())

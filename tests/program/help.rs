@@ -5,7 +5,7 @@ use morphcog::commands::plan::PAPER_TOML;
 use morphcog::commands::schema;
 use morphcog::config::BUILT_IN;
 
-const COMMANDS: [&str; 27] = [
+const COMMANDS: [&str; 28] = [
     "",
     "evolve",
     "response",
@@ -27,6 +27,7 @@ const COMMANDS: [&str; 27] = [
     "data info",
     "data sheet",
     "serve",
+    "site",
     "bench",
     "gallery",
     "config",

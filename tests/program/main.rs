@@ -27,6 +27,7 @@ mod robots;
 mod serve;
 mod serve_page;
 mod simulate;
+mod site;
 mod snapshots;
 mod sweep;
 mod team;

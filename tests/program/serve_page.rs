@@ -38,7 +38,7 @@ fn on_pad(tab: &mut Tab, line: &[[f64; 2]]) -> Vec<[f64; 2]> {
         .collect()
 }
 
-fn zero() -> Vec<[f64; 2]> {
+pub fn zero() -> Vec<[f64; 2]> {
     let place = |k: u32| {
         let angle = TAU * f64::from(k) / 40.0;
         [14.0 + 5.5 * angle.sin(), 14.0 - 8.5 * angle.cos()]
@@ -46,7 +46,7 @@ fn zero() -> Vec<[f64; 2]> {
     (0..=40).map(place).collect()
 }
 
-fn one() -> Vec<[f64; 2]> {
+pub fn one() -> Vec<[f64; 2]> {
     (0..=12)
         .map(|k| f64::from(k) / 12.0)
         .map(|t| [16.0 - 4.0 * t, 5.0 + 18.0 * t])
@@ -54,13 +54,13 @@ fn one() -> Vec<[f64; 2]> {
 }
 
 /// The robot that the page begins with.
-fn best() -> String {
+pub fn best() -> String {
     let trained = published::trained(ZERO_ONE).unwrap();
     trained[0].0.elites[0].id.clone()
 }
 
 /// Simulates without waiting for real time.
-fn as_fast_as_possible(tab: &mut Tab) {
+pub fn as_fast_as_possible(tab: &mut Tab) {
     tab.eval(
         "(() => { const s = document.getElementById('speed'); s.value = '0'; s.onchange(); })()",
     );
@@ -75,7 +75,7 @@ fn quick<'a>(browser: &'a mut Browser, server: &Server) -> Tab<'a> {
 }
 
 /// Chooses an archive by its number.
-fn choose(tab: &mut Tab, archive: &str) {
+pub fn choose(tab: &mut Tab, archive: &str) {
     let first = tab.text("#who");
     tab.eval(&format!(
         "(() => {{ const s = document.getElementById('archive'); s.value = '{archive}'; s.onchange(); }})()"
@@ -91,7 +91,7 @@ fn at_end(tab: &mut Tab) {
 }
 
 /// What the robot says in the end of the simulation under a drawing.
-fn answer(tab: &mut Tab, line: &[[f64; 2]]) -> (String, String) {
+pub fn answer(tab: &mut Tab, line: &[[f64; 2]]) -> (String, String) {
     draw(tab, line);
     at_end(tab);
     (tab.text("#says"), tab.text("#moved"))

@@ -203,7 +203,7 @@ impl World {
             ..serve::ServeOptions::default()
         })
         .unwrap();
-        let server = Server::bind(service, 0).unwrap();
+        let server = Server::bind(service, Default::default(), 0).unwrap();
         let port = server
             .url()
             .rsplit(':')

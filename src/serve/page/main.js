@@ -1,8 +1,9 @@
 // The page: which robot sees which picture, and what the simulation shows.
 
-import { $, element, get, post, tabs } from "./api.js";
+import { $, about, element, get, post, tabs } from "./api.js";
 import { Editor } from "./editor.js";
 import { Images } from "./images.js";
+import * as links from "./links.js";
 import { Simulation } from "./simulation.js";
 import { Pad } from "./pad.js";
 import { Robots, rows, signed } from "./robots.js";
@@ -159,6 +160,7 @@ const choose = (robot, from) => {
     rows: () => rows(robot), steps: () => Math.min(from.control_steps, 5000),
   };
   introduce(robot, from);
+  links.name({ robot: robot.id });
   const { left, right } = robot.judge ?? { left: [], right: [] };
   images.labels = left.concat(right).length ? left.concat(right) : null;
   start();
@@ -191,6 +193,7 @@ const editor = new Editor(materials, {
     $("who").textContent = "Your body";
     $("about").textContent = "from the editor";
     $("encoding").textContent = `${editor.cells.length} × ${editor.cells[0].length} pixels`;
+    links.name({ body: editor.cells });
     start();
   },
 });
@@ -339,9 +342,14 @@ try {
   await images.load();
   // Something to see at once: a test image, unless motion is not wanted.
   pictured();
+  const linked = links.named();
   await robots.load();
   await team.load();
+  if (linked?.robot) await robots.find(linked.robot);
+  if (linked?.body) { $("tab-editor").click(); editor.set(linked.body); $("live").click(); }
   invite();
   if (window.matchMedia("(prefers-reduced-motion: reduce)").matches) simulation?.play(false);
 } catch (error) { say(error); }
 document.documentElement.dataset.ready = "yes";
+// What the engine says of itself.
+about().then((words) => { $("engine").hidden = !words; $("engine").textContent = words ?? ""; }, say);

@@ -55,6 +55,16 @@ export class Robots {
 
   async archive(index) { return { ...await get("api/archives/" + index), index, name: this.list[index].called }; }
 
+  // Chooses the robot of an id, whichever archive it is in; without one, all stays as it is.
+  async find(id) {
+    for (const index of this.list.keys()) {
+      const robot = (await this.archive(index)).robots.find((one) => one.id === id);
+      if (!robot) continue;
+      if (index !== this.index) await this.open(index);
+      return this.choose(robot);
+    }
+  }
+
   // The curves of a run, and how long it will go on.
   async progress() {
     const { index } = this, now = this.list[index];

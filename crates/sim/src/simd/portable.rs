@@ -4,12 +4,16 @@ use super::{Lanes, each};
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
 /// Returns a · b + c, rounded once: by `libm`, which looks for an instruction at run time, since
-/// the C library's (`f64::mul_add`) is not exact everywhere.
+/// the C library's (`f64::mul_add`) is not exact everywhere. WebAssembly has no such instruction, and
+/// in software it would be several times as slow as all else: there it is rounded twice, and a
+/// browser's walks agree with the program's as far as rounding lets them.
 #[inline(always)]
 #[allow(clippy::disallowed_methods, reason = "these are the lanes")]
 fn mul_add(a: f64, b: f64, c: f64) -> f64 {
     if cfg!(any(target_arch = "aarch64", target_feature = "fma")) {
         a.mul_add(b, c)
+    } else if cfg!(target_family = "wasm") {
+        a * b + c
     } else {
         libm::fma(a, b, c)
     }
