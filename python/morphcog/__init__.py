@@ -514,7 +514,7 @@ class Robot:
         """A page for a browser in which it walks under its training images, as HTML."""
         return self.recording()._data.page()
 
-    def gif(self, path, *, width=360, every=2, side_by_side=False):
+    def gif(self, path, *, width=480, every=2, side_by_side=False):
         """Writes an animation of it under its training images, and returns the path; as Recording.save."""
         path = _path(path)
         if not path.lower().endswith(".gif"):

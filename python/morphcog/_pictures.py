@@ -48,7 +48,7 @@ class Recording:
         """How far it walked under each image, in voxel lengths; fewer if it became unstable."""
         return self._data.displacements
 
-    def save(self, path, *, width=360, every=2, side_by_side=False):
+    def save(self, path, *, width=480, every=2, side_by_side=False):
         """Writes it; the ending of the name says as what: a page (.html), an animation (.gif) or its last moment
         (.png). Of animations, width: pixels; every: control steps from one frame to the next (2: in real time); side_by_side: all
         images at once. Returns the path."""

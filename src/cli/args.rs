@@ -397,7 +397,7 @@ pub(super) struct ReplayArgs {
     /// Show all images at once, instead of one after another (the page has a button).
     #[arg(long)]
     pub(super) side_by_side: bool,
-    /// Width of pictures in pixels; with --side-by-side, of each walk (default: 480; GIFs 360, films 1280).
+    /// Width of pictures in pixels; with --side-by-side, of each walk (default: 480, films 1280).
     #[arg(long, value_parser = whole::<u32>(0..=MOST))]
     pub(super) width: Option<u32>,
     /// Control steps per frame: more is faster and a smaller file (default: 1, or 2 of a GIF without

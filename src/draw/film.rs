@@ -40,7 +40,7 @@ pub struct FilmOptions {
 impl Default for FilmOptions {
     fn default() -> Self {
         FilmOptions {
-            width: 360,
+            width: 480,
             fps: 25.0,
             every: 2,
             look: Look::Plain,

@@ -83,7 +83,7 @@ fn or_default(asked: &[Format]) -> &[Format] {
 pub(crate) struct PicturesWanted {
     /// The formats with their files (unused for the terminal).
     pub(crate) files: Vec<(Format, PathBuf)>,
-    /// The width of pictures, pixels; by default 480, 360 of a GIF, and 1280 of films.
+    /// The width of pictures, pixels; by default 480, and 1280 of films.
     pub(crate) width: Option<u32>,
     /// The control steps from one frame to the next.
     pub(crate) every: Option<usize>,
@@ -105,7 +105,6 @@ impl PicturesWanted {
         };
         let width = match format {
             Format::Mp4 | Format::Webm | Format::Frames => 1280,
-            Format::Gif => 360,
             _ => 480,
         };
         FilmOptions {
