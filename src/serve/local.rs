@@ -52,7 +52,7 @@ impl Local {
     pub(crate) fn walk(&mut self, request: &str) -> Result<f64, Error> {
         let said =
             |(_, line): (u16, Vec<u8>)| Error::other(String::from_utf8_lossy(&line).into_owned());
-        let begun = self.begin("/api/simulations", request.as_bytes(), [0, 1]);
+        let begun = self.begin("/api/simulations", request.as_bytes(), &[]);
         let (id, _) = begun.map_err(said)?;
         let Some(Simulation::Robot(robot)) = self.simulations.get_mut(&id) else {
             return Err(Error::other(
@@ -79,9 +79,8 @@ impl Local {
         }
     }
 
-    /// Begins the simulation of a robot, or of the members of a team whose numbers leave `share` when
-    /// divided by `of`. Returns its number and its first event, or an HTTP status and one line on
-    /// what is wrong.
+    /// Begins the simulation of a robot, or of those members of a team that have these numbers.
+    /// Returns its number and its first event.
     ///
     /// # Errors
     /// Returns an HTTP status and one line on what is wrong.
@@ -89,7 +88,7 @@ impl Local {
         &mut self,
         target: &str,
         body: &[u8],
-        [share, of]: [usize; 2],
+        members: &[usize],
     ) -> Result<(u64, String), (u16, Vec<u8>)> {
         let id = self.begun + 1;
         let reply = routes::reply(&self.service, &Request::new("POST", target, body));
@@ -101,7 +100,7 @@ impl Local {
                 (Simulation::Robot(Box::new((*plan, walk))), event)
             }
             Reply::Team(plan) => {
-                let walk = TeamWalk::new(&plan, |number| number % of.max(1) == share);
+                let walk = TeamWalk::new(&plan, |number| members.contains(&number));
                 let event = stream::of_team(&walk.begins(id, &plan));
                 (Simulation::Team(Box::new(walk)), event)
             }

@@ -89,7 +89,11 @@ fn largest<'a>(collections: impl IntoIterator<Item = (usize, &'a Arc<Collection>
         .map(|(_, members)| members)
         .max_by_key(Vec::len)
         .unwrap_or_default();
-    members.sort_by(|a, b| a.task.cmp(&b.task));
+    // Pairs of the first classes come first: 0|1, then 0|2 and 1|2, then 0|3 ...
+    members.sort_by_key(|member| {
+        let last = classes([&member.judge]).pop();
+        (last, member.task.clone())
+    });
     members
 }
 

@@ -3,16 +3,19 @@
 use super::program::{Sandbox, skipped};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
+use rustix::process::{Pid, Signal, kill_process_group};
 use serde_json::{Value, json};
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Write};
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// Time limit of every wait.
-const LIMIT: Duration = Duration::from_secs(25);
+const LIMIT: Duration = Duration::from_secs(60);
 const NAMES: [&str; 4] = [
     "chromium",
     "chromium-browser",
@@ -70,6 +73,11 @@ pub struct Browser {
 impl Browser {
     /// Starts it with its own profile in the sandbox.
     pub fn start(program: &Path, sandbox: &Sandbox) -> Self {
+        Browser::with(program, sandbox, &[])
+    }
+
+    /// Starts it with further options.
+    pub fn with(program: &Path, sandbox: &Sandbox, options: &[&str]) -> Self {
         // It reads its commands from file 3 and answers to file 4.
         let mut child = Command::new("sh")
             .args([
@@ -78,6 +86,7 @@ impl Browser {
             ])
             .arg(program)
             .args(FLAGS)
+            .args(options)
             .arg(format!(
                 "--user-data-dir={}",
                 sandbox.path("profile").display()
@@ -85,6 +94,8 @@ impl Browser {
             .arg("about:blank")
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
+            // A group of its own, which can be slowed down.
+            .process_group(0)
             .spawn()
             .unwrap();
         let (to, mut out) = (
@@ -113,6 +124,27 @@ impl Browser {
             from,
             events: VecDeque::new(),
             number: 0,
+        }
+    }
+
+    /// Slows all of its processes down until the result is dropped: of every 20 ms they run in one
+    /// part of this many.
+    pub fn slowed(&self, parts: u32) -> Slowed {
+        let group = Pid::from_child(&self.child);
+        let (end, ended) = channel();
+        let cycle = Duration::from_millis(20);
+        let pulse = std::thread::spawn(move || {
+            let mut goes_on = true;
+            while goes_on {
+                let _ = kill_process_group(group, Signal::STOP);
+                std::thread::sleep(cycle * (parts - 1) / parts);
+                let _ = kill_process_group(group, Signal::CONT);
+                goes_on = ended.recv_timeout(cycle / parts) == Err(RecvTimeoutError::Timeout);
+            }
+        });
+        Slowed {
+            end: Some(end),
+            pulse: Some(pulse),
         }
     }
 
@@ -183,6 +215,21 @@ impl Drop for Browser {
         }
         let _ = self.child.kill();
         let _ = self.child.wait();
+    }
+}
+
+/// A browser that is slowed down.
+pub struct Slowed {
+    end: Option<Sender<()>>,
+    pulse: Option<JoinHandle<()>>,
+}
+
+impl Drop for Slowed {
+    fn drop(&mut self) {
+        drop(self.end.take());
+        if let Some(pulse) = self.pulse.take() {
+            let _ = pulse.join();
+        }
     }
 }
 

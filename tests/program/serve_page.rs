@@ -7,9 +7,11 @@ use crate::common::browser::{Browser, Tab, found, keep_picture};
 use crate::common::hostile::Dice;
 use crate::common::program::{Sandbox, terminate};
 use crate::common::server::{Proxy, Server};
+use crate::site::{open, site};
 use morphcog::robots::published;
 use morphcog::shipped::gallery::{TEAM, ZERO_ONE};
 use serde_json::Value;
+use std::cell::RefCell;
 use std::f64::consts::TAU;
 use std::time::{Duration, Instant};
 
@@ -18,9 +20,16 @@ fn browser(sandbox: &Sandbox) -> Option<Browser> {
     Some(Browser::start(&found()?, sandbox))
 }
 
-fn open(tab: &mut Tab, server: &Server) {
-    tab.open(&server.url());
-    tab.wait("document.documentElement?.dataset.ready === 'yes'");
+/// Tests a page with both of its engines: the program behind `serve`, and the module of `site`.
+fn with_both_engines(test: impl Fn(&mut Browser, &str, &'static str)) {
+    let sandbox = Sandbox::new();
+    let Some(mut browser) = browser(&sandbox) else {
+        return;
+    };
+    let server = Server::start(&sandbox, "");
+    for (engine, url) in [("serve", server.url()), ("site", site(&sandbox).url())] {
+        test(&mut browser, &url, engine);
+    }
 }
 
 /// Draws on the pad with the mouse; places in pixels of the drawing.
@@ -67,9 +76,9 @@ pub fn as_fast_as_possible(tab: &mut Tab) {
 }
 
 /// A page of its own at the usual size, without waiting for real time.
-fn quick<'a>(browser: &'a mut Browser, server: &Server) -> Tab<'a> {
+fn quick<'a>(browser: &'a mut Browser, url: &str) -> Tab<'a> {
     let mut tab = browser.tab(1280, 900, false);
-    open(&mut tab, server);
+    open(&mut tab, url);
     as_fast_as_possible(&mut tab);
     tab
 }
@@ -99,97 +108,93 @@ pub fn answer(tab: &mut Tab, line: &[[f64; 2]]) -> (String, String) {
 
 #[test]
 fn a_drawn_zero_and_a_drawn_one_are_told_apart_and_the_page_fits_everywhere() {
-    let sandbox = Sandbox::new();
-    let Some(mut browser) = browser(&sandbox) else {
-        return;
-    };
-    let server = Server::start(&sandbox, "");
+    with_both_engines(|browser, url, engine| {
+        let mut tab = browser.tab(1280, 900, false);
+        open(&mut tab, url);
+        // It begins with the best of the trained robots; the published ones are a choice away.
+        assert_eq!(tab.text("#who"), best());
+        // That one knows two digits, and says so.
+        assert_eq!(
+            (tab.text("#invites"), tab.text("#knows")),
+            (
+                "Draw a 0 or a 1. For all ten digits: Team".to_string(),
+                "it knows only 0 and 1".to_string()
+            )
+        );
+        choose(&mut tab, "1");
+        assert_eq!(tab.text("#who"), "QMAXD");
+        as_fast_as_possible(&mut tab);
+        // QMAXD walks right under a zero, left under a one.
+        let (says, moved) = answer(&mut tab, &zero());
+        assert!(says == "0" && moved.ends_with("right"), "{says}: {moved}");
+        let (says, moved) = answer(&mut tab, &one());
+        assert!(says == "1" && moved.ends_with("left"), "{says}: {moved}");
+        let spoken = tab.text("#spoken");
+        assert!(
+            spoken.starts_with("QMAXD sees your drawing. It says 1: moved "),
+            "{spoken}"
+        );
 
-    let mut tab = browser.tab(1280, 900, false);
-    open(&mut tab, &server);
-    // It begins with the best of the trained robots; the published ones are a choice away.
-    assert_eq!(tab.text("#who"), best());
-    // That one knows two digits, and says so.
-    assert_eq!(
-        (tab.text("#invites"), tab.text("#knows")),
-        (
-            "Draw a 0 or a 1. For all ten digits: Team".to_string(),
-            "it knows only 0 and 1".to_string()
-        )
-    );
-    choose(&mut tab, "1");
-    assert_eq!(tab.text("#who"), "QMAXD");
-    as_fast_as_possible(&mut tab);
-    // QMAXD walks right under a zero, left under a one.
-    let (says, moved) = answer(&mut tab, &zero());
-    assert!(says == "0" && moved.ends_with("right"), "{says}: {moved}");
-    let (says, moved) = answer(&mut tab, &one());
-    assert!(says == "1" && moved.ends_with("left"), "{says}: {moved}");
-    let spoken = tab.text("#spoken");
-    assert!(
-        spoken.starts_with("QMAXD sees your drawing. It says 1: moved "),
-        "{spoken}"
-    );
+        // The same without a mouse: the pen is put down, moved and lifted by keys.
+        tab.click("#clear");
+        tab.eval("document.getElementById('pad').focus()");
+        tab.key(" ", " ");
+        (0..6).for_each(|_| tab.key("ArrowDown", ""));
+        tab.key(" ", " ");
+        at_end(&mut tab);
+        let by_keys = tab.text("#spoken");
+        assert!(
+            by_keys.starts_with("QMAXD sees your drawing.") && by_keys != spoken,
+            "{by_keys}"
+        );
 
-    // The same without a mouse: the pen is put down, moved and lifted by keys.
-    tab.click("#clear");
-    tab.eval("document.getElementById('pad').focus()");
-    tab.key(" ", " ");
-    (0..6).for_each(|_| tab.key("ArrowDown", ""));
-    tab.key(" ", " ");
-    at_end(&mut tab);
-    let by_keys = tab.text("#spoken");
-    assert!(
-        by_keys.starts_with("QMAXD sees your drawing.") && by_keys != spoken,
-        "{by_keys}"
-    );
-
-    // Another robot, a test image of a known class, the editor.
-    tab.click("[data-robot=YJTLA]");
-    assert_eq!(tab.text("#who"), "YJTLA");
-    tab.click("#tab-test");
-    tab.click("#thumbs button");
-    at_end(&mut tab);
-    let judged = tab.eval("document.getElementById('verdict').dataset.state");
-    assert!(
-        ["right", "wrong", "none"].contains(&judged.as_str().unwrap()),
-        "{judged}"
-    );
-    tab.click("#tab-editor");
-    tab.wait("document.getElementById('checked').dataset.state === 'good'");
-    tab.click("#live");
-    assert_eq!(tab.text("#who"), "Your body");
-    let invites = tab.text("#invites");
-    assert!(invites.contains("has no task"), "{invites}");
-    assert_eq!(tab.text("#knows"), "");
-    tab.click("#empty");
-    tab.wait("document.getElementById('checked').dataset.state === 'bad' && document.getElementById('live').disabled");
-    tab.click("#unpaint");
-    tab.wait("!document.getElementById('live').disabled");
-    assert_eq!(tab.eval("document.getElementById('error').hidden"), true);
-    assert_eq!(tab.complaints(), Vec::<String>::new());
-    tab.close();
-
-    for (width, height, dark) in [(390, 844, false), (1280, 900, true)] {
-        let mut tab = browser.tab(width, height, dark);
-        open(&mut tab, &server);
-        tab.wait("document.getElementById('moved').textContent.startsWith('moved')");
-        let wide = tab
-            .eval("document.documentElement.scrollWidth")
-            .as_u64()
-            .unwrap();
-        assert!(wide <= u64::from(width), "{wide} pixels wide");
-        // Nothing that can be used sticks out, and all of it has a name.
-        let nameless = "[...document.querySelectorAll('button, select, input, canvas')].filter((e) => \
-         e.offsetParent && \
-             !(e.textContent.trim() || e.ariaLabel || e.title || e.labels?.length || e.closest('button'))).length";
-        assert_eq!(tab.eval(nameless), 0);
-        let shot = tab.screenshot();
-        assert!(shot.len() > 20_000, "{} bytes", shot.len());
-        keep_picture(&format!("serve-{width}.png"), &shot);
+        // Another robot, a test image of a known class, the editor.
+        tab.click("[data-robot=YJTLA]");
+        assert_eq!(tab.text("#who"), "YJTLA");
+        tab.click("#tab-test");
+        tab.click("#thumbs button");
+        at_end(&mut tab);
+        let judged = tab.eval("document.getElementById('verdict').dataset.state");
+        assert!(
+            ["right", "wrong", "none"].contains(&judged.as_str().unwrap()),
+            "{judged}"
+        );
+        tab.click("#tab-editor");
+        tab.wait("document.getElementById('checked').dataset.state === 'good'");
+        tab.click("#live");
+        assert_eq!(tab.text("#who"), "Your body");
+        let invites = tab.text("#invites");
+        assert!(invites.contains("has no task"), "{invites}");
+        assert_eq!(tab.text("#knows"), "");
+        tab.click("#empty");
+        tab.wait("document.getElementById('checked').dataset.state === 'bad' && document.getElementById('live').disabled");
+        tab.click("#unpaint");
+        tab.wait("!document.getElementById('live').disabled");
+        assert_eq!(tab.eval("document.getElementById('error').hidden"), true);
         assert_eq!(tab.complaints(), Vec::<String>::new());
         tab.close();
-    }
+
+        for (width, height, dark) in [(390, 844, false), (1280, 900, true)] {
+            let mut tab = browser.tab(width, height, dark);
+            open(&mut tab, url);
+            tab.wait("document.getElementById('moved').textContent.startsWith('moved')");
+            let wide = tab
+                .eval("document.documentElement.scrollWidth")
+                .as_u64()
+                .unwrap();
+            assert!(wide <= u64::from(width), "{wide} pixels wide");
+            // Nothing that can be used sticks out, and all of it has a name.
+            let nameless = "[...document.querySelectorAll('button, select, input, canvas')].filter((e) => \
+         e.offsetParent && \
+             !(e.textContent.trim() || e.ariaLabel || e.title || e.labels?.length || e.closest('button'))).length";
+            assert_eq!(tab.eval(nameless), 0);
+            let shot = tab.screenshot();
+            assert!(shot.len() > 20_000, "{} bytes", shot.len());
+            keep_picture(&format!("{engine}-{width}.png"), &shot);
+            assert_eq!(tab.complaints(), Vec::<String>::new());
+            tab.close();
+        }
+    });
 }
 
 /// A digit as somebody may draw it: of any size, anywhere on the pad, slanted, with an unsteady hand.
@@ -236,30 +241,42 @@ fn by_hand(digit: u8, dice: &mut Dice) -> Vec<[f64; 2]> {
     line
 }
 
+/// The number of drawings; `MORPHCOG_DRAWINGS` may ask for more.
+fn drawings() -> u32 {
+    std::env::var("MORPHCOG_DRAWINGS").map_or(8, |count| count.parse().unwrap())
+}
+
 #[test]
-fn digits_drawn_in_any_size_place_and_slant_are_read_by_the_robot_that_the_page_begins_with() {
-    let sandbox = Sandbox::new();
-    let Some(mut browser) = browser(&sandbox) else {
-        return;
-    };
-    let server = Server::start(&sandbox, "");
-    let mut tab = quick(&mut browser, &server);
-    let mut wrong = Vec::new();
-    let mut dice = Dice::new(77, 1);
-    for number in 0..8 {
-        let digit = number % 2;
-        tab.pointer = if dice.below(2) == 0 { "mouse" } else { "pen" };
-        let (says, moved) = answer(&mut tab, &by_hand(digit, &mut dice));
-        if says != digit.to_string() {
-            wrong.push(format!("drawing {number}: a {digit} is {says:?}, {moved}"));
+fn digits_drawn_in_any_size_place_and_slant_are_read_by_the_first_robot_and_alike_by_both_engines()
+{
+    let answers = RefCell::new(Vec::new());
+    with_both_engines(|browser, url, engine| {
+        let mut tab = quick(browser, url);
+        let mut dice = Dice::new(77, 1);
+        for number in 0..drawings() {
+            let digit = (number % 2) as u8;
+            tab.pointer = if dice.below(2) == 0 { "mouse" } else { "pen" };
+            let (says, moved) = answer(&mut tab, &by_hand(digit, &mut dice));
+            answers
+                .borrow_mut()
+                .push((engine, number, digit, says, moved));
         }
-    }
-    assert!(
-        wrong.is_empty(),
-        "{} of 8 wrong:\n{}",
-        wrong.len(),
-        wrong.join("\n")
-    );
+    });
+    let answers = answers.into_inner();
+    let wrong: Vec<_> = answers
+        .iter()
+        .filter(|(_, _, digit, says, _)| *says != digit.to_string())
+        .collect();
+    let (served, static_page) = answers.split_at(drawings() as usize);
+    let apart: Vec<_> = served
+        .iter()
+        .zip(static_page)
+        .filter(|(one, other)| one.3 != other.3)
+        .collect();
+    // Of 60 drawings, one may be read otherwise, and one may be beyond the robot.
+    let few = drawings() as usize / 60;
+    assert!(apart.len() <= few, "read otherwise: {apart:#?}");
+    assert!(wrong.len() <= 2 * few, "read wrongly: {wrong:#?}");
 }
 
 /// True if an element is in sight, whole.
@@ -273,67 +290,60 @@ fn is_in_sight(tab: &mut Tab, id: &str, height: f64) -> bool {
 
 #[test]
 fn pad_answer_and_what_the_body_knows_are_in_sight_together_on_a_phone_and_on_a_desk() {
-    let sandbox = Sandbox::new();
-    let Some(mut browser) = browser(&sandbox) else {
-        return;
-    };
-    let server = Server::start(&sandbox, "");
-    for (width, height) in [(390, 844), (1280, 800)] {
-        let mut tab = browser.tab(width, height, false);
-        open(&mut tab, &server);
-        as_fast_as_possible(&mut tab);
-        answer(&mut tab, &zero());
-        tab.eval("window.scrollTo(0, 0)");
-        for id in ["says", "knows", "invites", "pad", "world"] {
-            assert!(
-                is_in_sight(&mut tab, id, f64::from(height)),
-                "{width}: {id}"
-            );
-        }
-        // The part of the drawing that the sensors see is framed in it.
-        assert_eq!(tab.eval("document.getElementById('whole').hidden"), false);
-        keep_picture(&format!("serve-together-{width}.png"), &tab.screenshot());
-        tab.click("#invites a");
-        assert_eq!(tab.text("#who"), "The team");
-        at_end(&mut tab);
-        tab.eval("window.scrollTo(0, 0)");
-        for id in ["says", "pad"] {
-            assert!(
-                is_in_sight(&mut tab, id, f64::from(height)),
-                "{width}: {id}"
-            );
-        }
-        assert_eq!(tab.text("#invites"), "Draw any digit from 0 to 9.");
-        // No body touches the edge of its stage: the world is gray, and voxels are not.
-        let cut = "[...document.querySelectorAll('#stages canvas')].filter((canvas) => {
+    with_both_engines(|browser, url, engine| {
+        for (width, height) in [(390, 844), (1280, 800)] {
+            let mut tab = browser.tab(width, height, false);
+            open(&mut tab, url);
+            as_fast_as_possible(&mut tab);
+            answer(&mut tab, &zero());
+            tab.eval("window.scrollTo(0, 0)");
+            for id in ["says", "knows", "invites", "pad", "world"] {
+                assert!(
+                    is_in_sight(&mut tab, id, f64::from(height)),
+                    "{width}: {id}"
+                );
+            }
+            // The part of the drawing that the sensors see is framed in it.
+            assert_eq!(tab.eval("document.getElementById('whole').hidden"), false);
+            keep_picture(&format!("{engine}-together-{width}.png"), &tab.screenshot());
+            tab.click("#invites a");
+            assert_eq!(tab.text("#who"), "The team");
+            at_end(&mut tab);
+            tab.eval("window.scrollTo(0, 0)");
+            for id in ["says", "pad"] {
+                assert!(
+                    is_in_sight(&mut tab, id, f64::from(height)),
+                    "{width}: {id}"
+                );
+            }
+            assert_eq!(tab.text("#invites"), "Draw any digit from 0 to 9.");
+            // No body touches the edge of its stage: the world is gray, and voxels are not.
+            let cut = "[...document.querySelectorAll('#stages canvas')].filter((canvas) => {
             const { width, height } = canvas, edge = (...box) => [...canvas.getContext('2d').getImageData(...box).data];
             const all = [edge(0, 0, 1, height), edge(width - 1, 0, 1, height), edge(0, 0, width, 1)].flat();
             return all.some((_, k) => k % 4 === 0 && Math.max(...all.slice(k, k + 3)) - Math.min(...all.slice(k, k + 3)) > 60);
         }).length";
-        assert_eq!(tab.eval(cut), 0);
-        let tie =
-            "Stages.said({ says: 8, tied: [5, 8], tie_broken_by: 'walks' }, Drawing.classNames())";
-        assert_eq!(
-            tab.eval(tie),
-            serde_json::json!({ "says": "5 or 8", "tie": "a tie; the longer walks decide for 8" })
-        );
-        assert_eq!(tab.complaints(), Vec::<String>::new());
-        tab.close();
-    }
+            assert_eq!(tab.eval(cut), 0);
+            let tie = "Stages.said({ says: 8, tied: [5, 8], tie_broken_by: 'walks' }, Drawing.classNames())";
+            assert_eq!(
+                tab.eval(tie),
+                serde_json::json!({ "says": "5 or 8", "tie": "a tie; the longer walks decide for 8" })
+            );
+            assert_eq!(tab.complaints(), Vec::<String>::new());
+            tab.close();
+        }
+    });
 }
 
 #[test]
 fn strokes_go_on_are_fitted_and_erased_as_the_hand_meant_them() {
-    let sandbox = Sandbox::new();
-    let Some(mut browser) = browser(&sandbox) else {
-        return;
-    };
-    let server = Server::start(&sandbox, "");
-    let mut tab = quick(&mut browser, &server);
-    a_drawing_is_fitted_unless_that_is_turned_off(&mut tab);
-    a_stroke_goes_on_when_the_pointer_is_taken_away_and_ends_when_it_is_up(&mut tab);
-    what_was_erased_is_not_seen_at_any_size_of_the_drawing(&mut tab);
-    assert_eq!(tab.complaints(), Vec::<String>::new());
+    with_both_engines(|browser, url, _| {
+        let mut tab = quick(browser, url);
+        a_drawing_is_fitted_unless_that_is_turned_off(&mut tab);
+        a_stroke_goes_on_when_the_pointer_is_taken_away_and_ends_when_it_is_up(&mut tab);
+        what_was_erased_is_not_seen_at_any_size_of_the_drawing(&mut tab);
+        assert_eq!(tab.complaints(), Vec::<String>::new());
+    });
 }
 
 fn a_drawing_is_fitted_unless_that_is_turned_off(tab: &mut Tab) {
@@ -393,7 +403,7 @@ fn what_was_erased_is_not_seen_at_any_size_of_the_drawing(tab: &mut Tab) {
         ),
     ] {
         let seen = tab.eval(&format!(
-            "import('/pad.js').then(({{ Pad }}) => {{
+            "import('./pad.js').then(({{ Pad }}) => {{
                const pad = new Pad(document.createElement('canvas'), () => {{}});
                pad.set([{{ erasing: false, points: {line} }}, {{ erasing: true, points: {erased} }}]);
                return pad.rows;
@@ -423,7 +433,7 @@ fn a_run_that_begins_while_the_page_is_open_appears_grows_and_ends_on_it() {
     };
     let server = Server::start(&sandbox, "");
     let mut tab = browser.tab(1280, 800, false);
-    open(&mut tab, &server);
+    open(&mut tab, &server.url());
     let mut child = sandbox.endless("runs/live");
     let text = "document.getElementById('archive').textContent";
     tab.wait(&format!("{text}.includes('of 10000000')"));
@@ -524,7 +534,7 @@ fn an_audit_that_appears_while_the_page_is_open_is_said_and_can_be_chosen_by() {
     };
     let server = Server::start(&sandbox, "--archive run");
     let mut tab = browser.tab(1280, 900, false);
-    open(&mut tab, &server);
+    open(&mut tab, &server.url());
     // The page begins with the archive that was named, and all its robots are on its map.
     assert_eq!(tab.eval("document.getElementById('archive').value"), "4");
     let elites = sandbox.run_file("run").elites.len();
@@ -572,7 +582,7 @@ fn a_body_that_is_built_and_its_robot_are_in_sight_together_and_the_simulation_e
     };
     let server = Server::start(&sandbox, "");
     let mut tab = browser.tab(1280, 800, false);
-    open(&mut tab, &server);
+    open(&mut tab, &server.url());
     as_fast_as_possible(&mut tab);
     tab.click("#tab-test");
     tab.click("#thumbs button");
@@ -610,7 +620,7 @@ fn a_body_that_is_built_and_its_robot_are_in_sight_together_and_the_simulation_e
     tab.close();
     none_soon();
     let mut tab = browser.tab(800, 600, false);
-    open(&mut tab, &server);
+    open(&mut tab, &server.url());
     tab.wait("document.getElementById('step').textContent.startsWith('step ')");
     tab.eval("document.getElementById('play').click()");
     assert_eq!(simulations(), 1);
@@ -620,19 +630,16 @@ fn a_body_that_is_built_and_its_robot_are_in_sight_together_and_the_simulation_e
 
 #[test]
 fn the_team_that_ships_reads_a_drawn_one() {
-    let sandbox = Sandbox::new();
-    let Some(mut browser) = browser(&sandbox) else {
-        return;
-    };
-    let server = Server::start(&sandbox, "");
-    let mut tab = quick(&mut browser, &server);
-    tab.click("#tab-team");
-    draw(&mut tab, &one());
-    tab.wait("document.querySelectorAll('#stages figure').length === 45");
-    at_end(&mut tab);
-    keep_picture("team-ten.png", &tab.screenshot());
-    assert_eq!(tab.text("#says"), "1");
-    assert_eq!(tab.complaints(), Vec::<String>::new());
+    with_both_engines(|browser, url, engine| {
+        let mut tab = quick(browser, url);
+        tab.click("#tab-team");
+        draw(&mut tab, &one());
+        tab.wait("document.querySelectorAll('#stages figure').length === 45");
+        at_end(&mut tab);
+        keep_picture(&format!("{engine}-team-ten.png"), &tab.screenshot());
+        assert_eq!(tab.text("#says"), "1");
+        assert_eq!(tab.complaints(), Vec::<String>::new());
+    });
 }
 
 #[test]
@@ -652,7 +659,7 @@ fn a_team_walks_on_small_stages_and_its_votes_are_counted() {
     let server = Server::start(&sandbox, "--archive a b c");
     for (width, height, dark) in [(1280, 800, false), (390, 844, true)] {
         let mut tab = browser.tab(width, height, dark);
-        open(&mut tab, &server);
+        open(&mut tab, &server.url());
         as_fast_as_possible(&mut tab);
         let alone = tab.text("#who");
         let names = "new Set([...document.getElementById('archive').options].map((o) => o.textContent)).size";
@@ -701,50 +708,47 @@ fn a_team_walks_on_small_stages_and_its_votes_are_counted() {
 
 #[test]
 fn cues_are_switched_while_the_body_walks_and_digits_come_back_with_their_robots() {
-    let sandbox = Sandbox::new();
-    let Some(mut browser) = browser(&sandbox) else {
-        return;
-    };
-    let server = Server::start(&sandbox, "");
-    let mut tab = browser.tab(1280, 900, false);
-    open(&mut tab, &server);
-    choose(&mut tab, "3");
-    tab.wait("!document.getElementById('cues').hidden");
-    let cues = |tab: &mut Tab| {
-        [
-            tab.text("#cues :nth-child(1)"),
-            tab.text("#cues :nth-child(2)"),
-        ]
-    };
-    assert_eq!(cues(&mut tab), ["Cue a: dark", "Cue b: dark"]);
-    let step = |tab: &mut Tab| tab.eval("Number(document.getElementById('time').value)");
-    tab.wait("Number(document.getElementById('time').value) > 20");
-    let before = step(&mut tab).as_f64().unwrap();
-    for (button, now, picture) in [
-        (
-            2,
-            ["Cue a: dark", "Cue b: bright"],
-            "01 (gates test image 1)",
-        ),
-        (
-            1,
-            ["Cue a: bright", "Cue b: bright"],
-            "11 (gates test image 3)",
-        ),
-    ] {
-        tab.click(&format!("#cues :nth-child({button})"));
-        tab.wait(&format!(
-            "document.getElementById('picture').textContent === '{picture}'"
-        ));
-        assert_eq!(cues(&mut tab), now);
-    }
-    // The same walk went on.
-    assert!(step(&mut tab).as_f64().unwrap() >= before);
-    let invites = tab.text("#invites");
-    assert!(invites.contains("of cues, not of drawings"), "{invites}");
-    keep_picture("serve-gates.png", &tab.screenshot());
-    choose(&mut tab, "0");
-    tab.wait("document.getElementById('cues').hidden");
-    assert_eq!(tab.text("#set option:checked"), "built-in digits");
-    assert_eq!(tab.complaints(), Vec::<String>::new());
+    with_both_engines(|browser, url, engine| {
+        let mut tab = browser.tab(1280, 900, false);
+        open(&mut tab, url);
+        choose(&mut tab, "3");
+        tab.wait("!document.getElementById('cues').hidden");
+        let cues = |tab: &mut Tab| {
+            [
+                tab.text("#cues :nth-child(1)"),
+                tab.text("#cues :nth-child(2)"),
+            ]
+        };
+        assert_eq!(cues(&mut tab), ["Cue a: dark", "Cue b: dark"]);
+        let step = |tab: &mut Tab| tab.eval("Number(document.getElementById('time').value)");
+        tab.wait("Number(document.getElementById('time').value) > 20");
+        let before = step(&mut tab).as_f64().unwrap();
+        for (button, now, picture) in [
+            (
+                2,
+                ["Cue a: dark", "Cue b: bright"],
+                "01 (gates test image 1)",
+            ),
+            (
+                1,
+                ["Cue a: bright", "Cue b: bright"],
+                "11 (gates test image 3)",
+            ),
+        ] {
+            tab.click(&format!("#cues :nth-child({button})"));
+            tab.wait(&format!(
+                "document.getElementById('picture').textContent === '{picture}'"
+            ));
+            assert_eq!(cues(&mut tab), now);
+        }
+        // The same walk went on.
+        assert!(step(&mut tab).as_f64().unwrap() >= before);
+        let invites = tab.text("#invites");
+        assert!(invites.contains("of cues, not of drawings"), "{invites}");
+        keep_picture(&format!("{engine}-gates.png"), &tab.screenshot());
+        choose(&mut tab, "0");
+        tab.wait("document.getElementById('cues').hidden");
+        assert_eq!(tab.text("#set option:checked"), "built-in digits");
+        assert_eq!(tab.complaints(), Vec::<String>::new());
+    });
 }

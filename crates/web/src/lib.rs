@@ -22,12 +22,12 @@ enum Call {
         target: String,
         body: String,
     },
-    /// Begin a simulation: of a team, the robots whose numbers leave `share[0]` divided by
-    /// `share[1]`.
+    /// Begin a simulation: of a team, the members that have these numbers.
     Begin {
         target: String,
         body: String,
-        share: [usize; 2],
+        #[serde(default)]
+        members: Vec<usize>,
     },
     /// Simulate control steps.
     Advance { id: u64, due: u32 },
@@ -111,8 +111,8 @@ fn answer(local: &mut Option<Local>, call: Call) -> (u16, Vec<u8>) {
         Call::Begin {
             target,
             body,
-            share,
-        } => match local.begin(&target, body.as_bytes(), share) {
+            members,
+        } => match local.begin(&target, body.as_bytes(), &members) {
             Ok((_, event)) => (200, event.into_bytes()),
             Err(refusal) => refusal,
         },

@@ -25,8 +25,10 @@ const bytesOf = async (name) => {
 
 const loaded = (async () => {
   if (typeof WebAssembly !== "object" || !WebAssembly.validate(SIMD) || typeof DecompressionStream !== "function") throw failed(0, TOO_OLD);
-  const [module, gallery] = await Promise.all([bytesOf("simulator.gz").then((bytes) => WebAssembly.compile(bytes)), bytesOf("gallery.gz").then((bytes) => new TextDecoder().decode(bytes))]);
-  return { module, gallery };
+  const text = (name) => bytesOf(name).then((bytes) => new TextDecoder().decode(bytes));
+  const [module, gallery, worker] = await Promise.all([bytesOf("simulator.gz").then((bytes) => WebAssembly.compile(bytes)), text("gallery.gz"), text("worker.js")]);
+  // Further workers begin without the server, which may be gone by then.
+  return { module, gallery, worker: URL.createObjectURL(new Blob([worker], { type: "text/javascript" })) };
 })();
 loaded.catch(() => { /* whoever asks hears of it */ });
 
@@ -35,10 +37,12 @@ class Hand {
   constructor() {
     this.waiting = [];
     this.busy = 0;
-    this.worker = new Worker("worker.js");
-    this.worker.onmessage = ({ data }) => this.waiting.shift().resolve(data);
-    this.worker.onerror = (event) => { for (const one of this.waiting.splice(0)) one.reject(failed(500, event.message || "a worker could not start")); };
-    this.ready = loaded.then(({ module, gallery }) => this.send({ module }).then(() => this.send({ call: "open", gallery }))).then(checked);
+    this.ready = loaded.then(({ module, gallery, worker }) => {
+      this.worker = new Worker(worker);
+      this.worker.onmessage = ({ data }) => this.waiting.shift().resolve(data);
+      this.worker.onerror = (event) => { for (const one of this.waiting.splice(0)) one.reject(failed(500, event.message || "a worker could not start")); };
+      return this.send({ module }).then(() => this.send({ call: "open", gallery }));
+    }).then(checked);
     this.ready.catch(() => { /* whoever calls hears of it */ });
   }
 
@@ -71,9 +75,16 @@ const events = (text) => text.split("\n\n").flatMap((event) => {
 const running = new Map();
 let begun = 0;
 
+// Answers a request as the server would.
+export const answer = async (method, target, body) => {
+  const first = hand(0);
+  await first.ready;
+  return first.send({ call: "answer", method, target, body });
+};
+
 export const get = async (path) => {
-  const answer = JSON.parse(await hand(0).call({ call: "answer", method: "GET", target: "/" + path, body: "" }));
-  return path === "api/status" ? { ...answer, simulations: running.size, max_simulations: CORES } : answer;
+  const value = JSON.parse(checked(await answer("GET", "/" + path, "")));
+  return path === "api/status" ? { ...value, simulations: running.size, max_simulations: CORES } : value;
 };
 
 export const post = async (path, value) => {
@@ -83,7 +94,7 @@ export const post = async (path, value) => {
     if (!simulation) throw failed(404, "the simulation has ended");
     return simulation.change(value);
   }
-  const text = await hand(0).call({ call: "answer", method: "POST", target: "/" + path, body });
+  const text = checked(await answer("POST", "/" + path, body));
   return text ? JSON.parse(text) : null;
 };
 
@@ -107,8 +118,16 @@ class Clock {
   }
 
   // How long one control step takes here, smoothed.
-  took(milliseconds, steps) { if (steps) this.cost = 0.7 * this.cost + 0.3 * milliseconds / steps; }
+  took(milliseconds, steps) { if (steps) this.cost = smoothed(this.cost, milliseconds / steps); }
 }
+
+const smoothed = (old, now) => 0.7 * old + 0.3 * now;
+
+// A result, and how many milliseconds it took.
+const timed = async (work) => {
+  const before = performance.now(), result = await work();
+  return [result, performance.now() - before];
+};
 
 const sleep = (milliseconds) => new Promise((resolve) => setTimeout(resolve, milliseconds));
 // Nobody looks at a hidden tab, so nothing is computed for it.
@@ -116,19 +135,15 @@ const seen = async () => {
   while (document.hidden) await new Promise((resolve) => document.addEventListener("visibilitychange", resolve, { once: true }));
 };
 
-// Advances a simulation at its pace until it ends or is dropped. `advance` returns true at the end.
+// Advances a simulation at its pace until it ends or is dropped. `advance` says whether it is "over" or "behind" its pace.
 const run = async (clock, signal, step, advance) => {
-  for (;;) {
+  for (let said = null; said !== "over";) {
     if (document.hidden) { await seen(); clock.begin = null; }
     if (signal.aborted) throw new DOMException("dropped", "AbortError");
     const due = clock.paused ? 0 : clock.due(step());
-    if (due) {
-      const before = performance.now();
-      if (await advance(due)) return;
-      clock.took(performance.now() - before, due);
-    }
+    said = due || (said === "behind" && !clock.paused) ? await advance(due) : null;
     // A message to itself gives the page time to draw.
-    await sleep(due && !clock.speed ? 0 : TICK);
+    if (said !== "over") await sleep(said === "behind" || (due && !clock.speed) ? 0 : TICK);
   }
 };
 
@@ -147,7 +162,7 @@ const robot = async (path, value, signal, tell) => {
       tell(name, data);
       return name === "end";
     };
-    const first = events(await own.call({ call: "begin", target: "/" + path, body: JSON.stringify(value), share: [0, 1] }));
+    const first = events(await own.call({ call: "begin", target: "/" + path, body: JSON.stringify(value) }));
     running.set(id, {
       change: async (news) => {
         clock.set(news);
@@ -158,7 +173,11 @@ const robot = async (path, value, signal, tell) => {
       },
     });
     first.forEach(hear);
-    await run(clock, signal, () => step, async (due) => events(await own.call({ call: "advance", id: inner, due })).map(hear).some(Boolean));
+    await run(clock, signal, () => step, async (due) => {
+      const [text, took] = await timed(() => own.call({ call: "advance", id: inner, due }));
+      clock.took(took, due);
+      return events(text).map(hear).some(Boolean) ? "over" : null;
+    });
   } finally {
     running.delete(id);
     own.busy--;
@@ -166,35 +185,74 @@ const robot = async (path, value, signal, tell) => {
   }
 };
 
-// A team's robots are shared out among all workers; the votes are counted where the first of them walks.
+// The robots of a team's first classes walk at the pace that is asked for, the others with what the device has left.
+const FIRST_CLASSES = 4;
+
+// Some members of a team, shared out among all workers.
+class Part {
+  constructor(numbers) { this.numbers = numbers; this.step = 0; this.cost = 10; this.shares = []; this.frames = []; this.moved = []; }
+
+  // Returns the first event, with all of its members that walk here.
+  async begin(target, body) {
+    const workers = all();
+    const share = (worker, k) => ({ worker, numbers: this.numbers.filter((_, place) => place % workers.length === k) });
+    const shares = workers.map(share).filter(({ numbers }) => numbers.length);
+    const begun = await Promise.all(shares.map(async (one) => {
+      const [[, data]] = events(await one.worker.call({ call: "begin", target, body, members: one.numbers }));
+      this.shares.push({ ...one, id: data.id });
+      return { numbers: one.numbers, data };
+    }));
+    const members = [];
+    for (const { numbers, data } of begun) for (const number of numbers) members[number] = data.members[number];
+    return { ...begun[0].data, members };
+  }
+
+  async advance(due) {
+    const [, took] = await timed(() => Promise.all(this.shares.map(async ({ worker, id, numbers }) => {
+      const [[, moment]] = events(await worker.call({ call: "advance", id, due }));
+      for (const number of numbers) { this.frames[number] = moment.frames[number]; this.moved[number] = moment.tally.moved[number]; }
+      this.step = moment.step;
+    })));
+    this.cost = smoothed(this.cost, took / due);
+    return took;
+  }
+
+  end() { for (const { worker, id } of this.shares) worker.call({ call: "end", id }).catch(() => { /* it has ended */ }); }
+}
+
 const team = async (path, value, signal, tell) => {
   await loaded;
-  const workers = all(), clock = new Clock(value.speed), id = ++begun, body = JSON.stringify(value);
-  let parts = [], step = 0, until = 0;
-  const of = (number) => number % workers.length;
+  const clock = new Clock(value.speed), id = ++begun, body = JSON.stringify(value);
+  const { members, classes } = await get(path), early = classes.slice(0, FIRST_CLASSES);
+  const of = (wanted) => members.flatMap(({ judge }, number) => (judge.left.concat(judge.right).every((label) => early.includes(label)) === wanted ? [number] : []));
+  const parts = [of(true), of(false)].filter((numbers) => numbers.length).map((numbers) => new Part(numbers)), [first, rest] = parts;
+  const merged = (values) => members.map((_, number) => parts.map((part) => values(part)[number]).find((value) => value !== undefined) ?? null);
   try {
-    parts = await Promise.all(workers.map(async (worker, share) => {
-      const [[, data]] = events(await worker.call({ call: "begin", target: "/" + path, body, share: [share, workers.length] }));
-      return { worker, inner: data.id, data };
-    }));
+    const data = await Promise.all(parts.map((part) => part.begin("/" + path, body))), { until } = data[0];
     running.set(id, { change: async (news) => { clock.set(news); return null; } });
-    const { data } = parts[0];
-    until = data.until;
-    tell("begin", { ...data, id, members: data.members.map((_, number) => parts[of(number)].data.members[number]) });
-    await run(clock, signal, () => step, async (due) => {
-      const moments = await Promise.all(parts.map(async ({ worker, inner }) => events(await worker.call({ call: "advance", id: inner, due }))[0][1]));
-      const merged = (values) => values(moments[0]).map((_, number) => values(moments[of(number)])[number]);
-      step = moments[0].step;
-      const moved = merged((moment) => moment.tally.moved), frames = merged((moment) => moment.frames);
-      const tally = JSON.parse(await parts[0].worker.call({ call: "tally", id: parts[0].inner, moved }));
-      tell("moment", { step, frames, tally });
-      if (step < until) return false;
-      tell("end", { step, tally });
-      return true;
+    tell("begin", { ...data[0], id, members: members.map((_, number) => data.map((part) => part.members[number]).find(Boolean)) });
+    // How far all should be by now.
+    let goal = 0;
+    await run(clock, signal, () => goal, async (due) => {
+      goal = Math.min(until, goal + due);
+      let left = LONGEST;
+      if (first.step < goal) {
+        const steps = goal - first.step, took = await first.advance(steps);
+        clock.took(took, steps);
+        left = clock.speed ? Math.max(0, TICK - took) : Infinity;
+      }
+      if (rest && rest.step < goal) await rest.advance(Math.min(goal - rest.step, Math.max(1, Math.floor(left / rest.cost))));
+      const { worker, id: counted } = first.shares[0];
+      const tally = JSON.parse(await worker.call({ call: "tally", id: counted, moved: merged((part) => part.moved) }));
+      const behind = rest && rest.step < first.step ? { robots: rest.numbers.length, step: rest.step } : null;
+      tell("moment", { step: first.step, frames: merged((part) => part.frames), tally, behind });
+      if (parts.some((part) => part.step < until)) return behind ? "behind" : null;
+      tell("end", { step: until, tally });
+      return "over";
     });
   } finally {
     running.delete(id);
-    for (const { worker, inner } of parts) worker.call({ call: "end", id: inner }).catch(() => { /* it has ended */ });
+    parts.forEach((part) => part.end());
   }
 };
 

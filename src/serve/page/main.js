@@ -15,18 +15,24 @@ const AFTER_STROKE = 300, WHILE_DRAWING = 60;
 // An answer of more letters is set small.
 const LONG = 14;
 
-const materials = await get("api/materials");
-let simulation = null, timer = 0, seen = null, previous = 0, drawn = null, looked = 0;
-// The picture: { drawing } or { image }; and the words for it.
-let picture = { shown: {}, about: "nothing, it is dark" };
-// Whose simulation it is: a robot of an archive, or the editor's body.
-let who = null;
-
 const say = (error) => {
   if (error?.name === "AbortError") return;
   $("error").hidden = !error;
   $("error").textContent = error ? error.message : "";
 };
+
+// Without an engine there is no page, only the reason.
+const materials = await get("api/materials").catch((error) => {
+  say(error);
+  $("status").textContent = "not running";
+  $("status").dataset.state = "lost";
+  throw error;
+});
+let simulation = null, timer = 0, seen = null, previous = 0, drawn = null, looked = 0;
+// The picture: { drawing } or { image }; and the words for it.
+let picture = { shown: {}, about: "nothing, it is dark" };
+// Whose simulation it is: a robot of an archive, or the editor's body.
+let who = null;
 
 const shownTo = () => (who?.own && editor.stimulus ? { stimulus: editor.stimulus } : picture.shown);
 
@@ -222,7 +228,10 @@ const drawTeam = () => {
   const { says: all, tie } = Stages.said(walk.tally, team.names), said = says === null && walk.end ? "undecided" : all;
   $("verdict").dataset.long = String(said.length > LONG);
   $("says").textContent = said;
-  $("moved").textContent = `${tie ? `${tie} · ` : ""}step ${walk.step} of ${walk.begun.until}`;
+  // A device that is too slow for all lets the first robots walk in time.
+  const { until, members } = walk.begun, { behind } = walk;
+  const step = behind ? `${members.length - behind.robots} robots at step ${walk.step}, ${behind.robots} at ${behind.step} of ${until}` : `step ${walk.step} of ${until}`;
+  $("moved").textContent = `${tie ? `${tie} · ` : ""}${step}`;
   const play = walk.end || walk.paused ? "Play" : "Pause";
   if ($("play").textContent !== play) $("play").textContent = play;
   if (walk.end && !walk.told) {

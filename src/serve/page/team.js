@@ -18,12 +18,12 @@ export class Team {
 
   start(shown, speed) {
     this.stop();
-    const walk = this.walk = { abort: new AbortController(), begun: null, frames: [], tally: null, step: 0, end: false, paused: false };
+    const walk = this.walk = { abort: new AbortController(), begun: null, frames: [], tally: null, step: 0, behind: null, end: false, paused: false };
     const hear = (name, data) => {
       if (this.walk !== walk) return;
       if (name === "begin") { walk.begun = data; walk.frames = data.members.map((member) => member.frames); walk.starts = walk.frames.map((text, k) => place(text, data.members[k].points, data.unit)); this.build(); }
-      if (name === "moment") { walk.step = data.step; data.frames.forEach((frame, k) => { walk.frames[k] = frame ?? walk.frames[k]; }); walk.tally = data.tally; }
-      if (name === "end") { walk.step = data.step; walk.tally = data.tally; walk.end = true; }
+      if (name === "moment") { walk.step = data.step; walk.behind = data.behind ?? null; data.frames.forEach((frame, k) => { walk.frames[k] = frame ?? walk.frames[k]; }); walk.tally = data.tally; }
+      if (name === "end") { walk.step = data.step; walk.behind = null; walk.tally = data.tally; walk.end = true; }
       walk.stale = true;
       this.changed(name, walk);
     };
