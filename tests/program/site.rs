@@ -339,6 +339,13 @@ fn a_browser_without_simd_is_told_what_is_missing() {
 }
 
 #[test]
+fn the_readme_leads_to_the_address_that_the_package_has_for_the_page() {
+    let readme = std::fs::read_to_string("README.md").unwrap();
+    let (first_screen, _) = readme.split_once("## ").unwrap();
+    assert!(first_screen.contains(&format!("({})", env!("CARGO_PKG_HOMEPAGE"))));
+}
+
+#[test]
 fn a_site_is_small_and_replaced_file_by_file() {
     let sandbox = Sandbox::new();
     sandbox.write("public/kept.txt", "mine");
