@@ -19,7 +19,8 @@ from elsewhere. Visitors need a browser with WebAssembly and SIMD (since 2023 al
 
 #[derive(Debug, Args)]
 pub(super) struct SiteArgs {
-    /// Folder to write; files of an earlier site there are replaced.
+    /// Folder to write; files of an earlier site there are replaced. If it has docs/index.html, the
+    /// page links to it.
     #[arg(value_name = "DIR")]
     out: PathBuf,
 }

@@ -3,7 +3,7 @@
 use crate::base::error::Error;
 use crate::base::files::write_atomically;
 use crate::serve::Service;
-use crate::serve::assets::{ASSETS, ENGINE};
+use crate::serve::assets::{ASSETS, ENGINE, PAGE};
 use crate::serve::local::Local;
 use crate::shipped::gallery;
 use flate2::Compression;
@@ -19,16 +19,22 @@ const SIMULATOR: &[u8] = include_bytes!("page/simulator.gz");
 /// Control steps of the walk by which a browser finds out whether it gives the program's bits.
 const PINNED_STEPS: u32 = 50;
 
+/// The documentation's first page, if there is documentation in the site's folder.
+const DOCUMENTATION: &str = "docs/index.html";
+
 /// Writes the site into a folder, which is made if it is not there, and returns its files. Files of
-/// an earlier site are replaced; others stay.
+/// an earlier site are replaced; others stay. If the folder has documentation
+/// (`docs/index.html`), the page links to it.
 ///
 /// # Errors
 /// Returns an error if a file cannot be written.
 pub(crate) fn write(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     std::fs::create_dir_all(folder).map_err(|error| Error::writing(folder, &error))?;
     let engine = include_str!("page/engine_local.js");
+    let documented = folder.join(DOCUMENTATION).is_file();
     let text = |(name, _, text): &(&'static str, &str, &'static str)| match *name {
         ENGINE => (ENGINE, engine.as_bytes().to_vec()),
+        PAGE if documented => (PAGE, with_documentation(text).into_bytes()),
         name => (name, text.as_bytes().to_vec()),
     };
     let mut files: Vec<(&str, Vec<u8>)> = ASSETS.iter().map(text).collect();
@@ -44,6 +50,16 @@ pub(crate) fn write(folder: &Path) -> Result<Vec<PathBuf>, Error> {
         }
     };
     files.into_iter().map(written).collect()
+}
+
+/// Returns the page with a link to the documentation at its foot.
+fn with_documentation(page: &str) -> String {
+    let link =
+        format!(r#"<a href="{DOCUMENTATION}">About morphcog: documentation and results</a>"#);
+    page.replace(
+        "</footer>",
+        &format!("  <p class=\"note\">{link}</p>\n</footer>"),
+    )
 }
 
 fn compressed(bytes: &[u8]) -> Vec<u8> {

@@ -368,3 +368,17 @@ fn a_site_is_small_and_replaced_file_by_file() {
     sandbox.write("file", "");
     sandbox.run("site file").ended(1, &["file"]);
 }
+
+#[test]
+fn the_page_links_to_documentation_that_lies_in_its_folder() {
+    let sandbox = Sandbox::new();
+    let link = "href=\"docs/index.html\"";
+    sandbox.run("site public").ended(0, &[]);
+    assert!(!sandbox.read("public/index.html").contains(link));
+    sandbox.write("public/docs/index.html", "documentation");
+    sandbox.run("site public").ended(0, &[]);
+    let page = sandbox.read("public/index.html");
+    assert_eq!(page.matches(link).count(), 1);
+    assert!(page.find("<footer>") < page.find(link));
+    assert_eq!(sandbox.read("public/docs/index.html"), "documentation");
+}
