@@ -10,7 +10,7 @@ from urllib.parse import unquote, urlsplit
 OUT = Path(sys.argv[1]).resolve()
 MOST_BYTES = 12_000_000
 # Addresses in styles, and in scripts those that are loaded rather than only named.
-IN_STYLE = re.compile(r"""(?:url\(|@import)\s*["']?([^"')\s;]+)""")
+IN_STYLE = re.compile(r"""(?:url\(|@import\s+(?!url))\s*["']?([^"')\s;]+)""")
 IN_SCRIPT = re.compile(r"""(?:\b(?:import|importScripts|fetch|Worker|open)\s*\(?|\bfrom|\.src\s*=)\s*["'`]([^"'`\s]+)""")
 
 
@@ -64,7 +64,7 @@ def faults():
             elif file.suffix != ".js" and not (file.parent / unquote(parts.path)).exists():
                 yield f"{file.relative_to(OUT)}: {address} does not exist"
     index = OUT / "docs/search/search_index.json"
-    entries = json.loads(index.read_text(encoding="utf-8"))["docs"]
+    entries = json.loads(index.read_text(encoding="utf-8"))["docs"] if index.exists() else []
     if len(entries) < 2 * pages or not any("voxel" in entry["text"] for entry in entries):
         yield f"{index.relative_to(OUT)}: {len(entries)} entries for {pages} pages"
     size = sum(file.stat().st_size for file in files)
