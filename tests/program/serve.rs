@@ -980,10 +980,11 @@ fn each_robot_of_the_team_that_ships_sees_and_walks_as_its_own_run_says() {
     );
     let drawing = Grid::from_fn(28, 28, |r, c| if (r + 2 * c) % 7 < 3 { 255 } else { 0 });
     let steps = 30;
-    let expected: Vec<f64> = team
+    let expected: BTreeMap<String, f64> = team
         .iter()
         .map(|(run, _)| {
-            let (config, body) = (&run.config, &run.elites[0].body);
+            let (config, elite) = (&run.config, &run.elites[0]);
+            let body = &elite.body;
             assert_eq!(
                 (&config.physics, &config.protocol),
                 (&first.physics, &first.protocol),
@@ -994,7 +995,7 @@ fn each_robot_of_the_team_that_ships_sees_and_walks_as_its_own_run_says() {
                 control_steps: steps,
                 ..config.protocol.clone()
             };
-            fresh_rollouts(
+            let moved = fresh_rollouts(
                 body,
                 &[seen],
                 &[],
@@ -1004,20 +1005,32 @@ fn each_robot_of_the_team_that_ships_sees_and_walks_as_its_own_run_says() {
             )
             .unwrap()
             .0[0]
-                .unwrap()
+                .unwrap();
+            (elite.id.clone(), moved)
         })
         .collect();
     let request = json!({ "shown": { "drawing": drawing }, "control_steps": steps, "speed": 0 });
     let events: Vec<(String, Value)> = server.events("/api/team", &request).collect();
     let moved: Vec<f64> =
         serde_json::from_value(events[events.len() - 1].1["tally"]["moved"].clone()).unwrap();
-    assert_eq!(moved, expected);
+    let members = json_of(&server.get("/api/team"))["members"].clone();
+    let members = members.as_array().unwrap();
+    let ids = members
+        .iter()
+        .map(|member| member["robot"].as_str().unwrap().to_string());
+    assert_eq!(ids.zip(moved).collect::<BTreeMap<String, f64>>(), expected);
+    // The pairs of the first four digits come first.
+    let tasks: Vec<&str> = members
+        .iter()
+        .take(6)
+        .map(|member| member["task"].as_str().unwrap())
+        .collect();
+    assert_eq!(tasks, ["0|1", "0|2", "1|2", "0|3", "1|3", "2|3"]);
     // And by itself, with its own pixels in the list of robots.
     let listed = json_of(&server.get("/api/archives/2"));
-    for (place, (run, _)) in team
+    for (run, _) in team
         .iter()
-        .enumerate()
-        .filter(|(_, (run, _))| run.config.stimulus != first.stimulus)
+        .filter(|(run, _)| run.config.stimulus != first.stimulus)
         .take(3)
     {
         let id = &run.elites[0].id;
@@ -1035,7 +1048,7 @@ fn each_robot_of_the_team_that_ships_sees_and_walks_as_its_own_run_says() {
         let alone: Vec<(String, Value)> = server.events("/api/simulations", &request).collect();
         assert_eq!(
             alone[alone.len() - 1].1["answer"]["moved"],
-            json!(expected[place])
+            json!(expected[&run.elites[0].id])
         );
     }
 }
