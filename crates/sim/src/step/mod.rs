@@ -105,7 +105,7 @@ pub(crate) fn before_rigid<L: Lanes>(
         &mut scratch.contact,
     );
     // Contacts use true velocities: position now minus position then. The integrator uses its own.
-    rk4::integrate::<L>(system, state, scratch);
+    rk4::integrate::<L>(system, ground.terrain.is_some(), state, scratch);
     meter
         .iter_mut()
         .for_each(|meter| meter.before_limits(&scratch.position));

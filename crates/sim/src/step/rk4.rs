@@ -17,8 +17,17 @@ use crate::step::springs::{Gather, Watch, squares, vectors};
 use crate::system::System;
 
 /// Advances velocities with constant contact forces; leaves the new positions in `scratch`.
+///
+/// On a terrain robots come to the floor plane beside it, and rise from it: then the middle stages
+/// may be below the floor although the last is not. On flat ground, where only what has tunnelled is
+/// below, the last stage alone decides.
 #[inline(always)]
-pub(crate) fn integrate<L: Lanes>(system: &System, state: &mut State, scratch: &mut Scratch) {
+pub(crate) fn integrate<L: Lanes>(
+    system: &System,
+    on_terrain: bool,
+    state: &mut State,
+    scratch: &mut Scratch,
+) {
     let System { lattice, physics } = system;
     if let Some(off_lattice) = &mut scratch.off_lattice {
         let goals = &scratch.goals[lattice.len..];
@@ -30,13 +39,14 @@ pub(crate) fn integrate<L: Lanes>(system: &System, state: &mut State, scratch: &
         true => first_stage::<L, false, false>(system, state, scratch),
         false => first_stage::<L, false, true>(system, state, scratch),
     };
-    if anew || !is_regular(scratch) {
+    let is_irregular = anew || !is_regular(scratch);
+    if is_irregular {
         match lattice.actuated_vertical.is_empty() {
             true => first_stage::<L, true, false>(system, state, scratch),
             false => first_stage::<L, true, true>(system, state, scratch),
         };
     }
-    if !later_stages::<L, false>(system, state, scratch) {
+    if (on_terrain && is_irregular) || !later_stages::<L, false>(system, state, scratch) {
         later_stages::<L, true>(system, state, scratch);
     }
     std::mem::swap(&mut state.velocity, &mut scratch.velocity);

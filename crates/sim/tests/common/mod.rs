@@ -2,10 +2,13 @@
 #![allow(dead_code, reason = "every test program uses its own part")]
 
 use flate2::read::MultiGzDecoder;
-use morphcog_sim::{Body, Grid, Material, Physics, Start, System, World};
+use morphcog_sim::{
+    Body, Grid, Material, Physics, Start, System, Terrain, TerrainObject, Unstable, World,
+};
 use serde::de::{DeserializeOwned, Error};
 use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -132,4 +135,75 @@ pub fn bits(mut world: World) -> impl Iterator<Item = Vec<u8>> {
                 .collect(),
         )
     })
+}
+
+/// A robot of EvoGym's own materials on a terrain.
+#[derive(Deserialize)]
+pub struct TerrainReference {
+    body: Vec<Vec<u8>>,
+    pub control_steps: u64,
+    phase: f64,
+    pub ended_at: i64,
+    pub com: Vec<[f64; 2]>,
+    pub points: BTreeMap<u64, Vec<[f64; 2]>>,
+    pub spread_voxels_elsewhere: f64,
+    pub first_step_beyond_1e_9: i64,
+    terrain_objects: Vec<FixedObject>,
+    pub start_column: i64,
+    start_row: u32,
+}
+
+#[derive(Deserialize)]
+struct FixedObject {
+    column: u32,
+    row: u32,
+    grid: Vec<String>,
+}
+
+impl TerrainReference {
+    /// At its beginning.
+    pub fn world(&self) -> World {
+        let physics = Physics::default();
+        // EvoGym's 3 and 4 are actuators.
+        let codes = Grid::from_rows(self.body.clone()).unwrap();
+        let ours = |&code: &u8| Material::from_code(if code > 2 { code + 4 } else { code });
+        let body = Body::new(codes.map(|code| ours(code).unwrap())).unwrap();
+        let object = |object: &FixedObject| {
+            let cells = |row: &String| row.chars().map(|cell| cell == '5').collect();
+            TerrainObject {
+                column: object.column,
+                row: object.row,
+                cells: Grid::from_rows(object.grid.iter().map(cells).collect()).unwrap(),
+            }
+        };
+        let objects: Vec<TerrainObject> = self.terrain_objects.iter().map(object).collect();
+        let terrain = Terrain::new(&objects, physics.cell_size).unwrap();
+        let start = Start {
+            column: self.start_column,
+            row: self.start_row,
+        };
+        World::on_terrain(System::new(&body, physics), start, terrain).unwrap()
+    }
+
+    /// Simulates the next control step of its open-loop controller.
+    pub fn step(&self, world: &mut World) -> Result<(), Unstable> {
+        let actuators = self.body.iter().flatten().filter(|code| **code > 2).count();
+        let turn = TAU * world.control_step() as f64 / 25.0;
+        let target = |k: usize| 1.1 + 0.5 * (turn + self.phase * k as f64).sin();
+        let targets: Vec<f64> = (0..actuators).map(target).collect();
+        world.set_targets(&targets).unwrap();
+        world.step()
+    }
+}
+
+/// All runs on terrain, by name.
+pub fn terrain_references() -> Vec<(String, TerrainReference)> {
+    let names = names(&folder().join("terrain"));
+    let read = |name: String| {
+        let reference = golden(&format!("terrain/{name}"));
+        (name, reference)
+    };
+    let all: Vec<_> = names.into_iter().map(read).collect();
+    assert_eq!(all.len(), 39);
+    all
 }
