@@ -105,8 +105,8 @@ fn load_of<L: Lanes>(work: &Work, off_lattice: Option<&OffLattice>, slot: usize)
     each!(axis in [X, Y] => of[axis] + L::load(&off_lattice.load[axis], slot))
 }
 
-/// Runs the first stage, with goals of vertical springs if `VERTICAL`: the load without springs, the springs' rest lengths, and the second
-/// stage's positions. Returns true if all was regular.
+/// Runs the first stage: the load without springs, the springs' rest lengths (of vertical springs,
+/// too, if `VERTICAL`), and the second stage's positions. Returns true if all was regular.
 #[inline(always)]
 fn first_stage<L: Lanes, const EXACT: bool, const VERTICAL: bool>(
     System { lattice, physics }: &System,

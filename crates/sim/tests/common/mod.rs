@@ -1,4 +1,8 @@
 //! Trajectories of EvoGym's own (see `tests/golden/README.md`).
+#![allow(
+    clippy::disallowed_methods,
+    reason = "a test needs no same bits everywhere"
+)]
 #![allow(dead_code, reason = "every test program uses its own part")]
 
 use flate2::read::MultiGzDecoder;
