@@ -272,6 +272,7 @@ pub fn record_unless(
     let mut recording = Recording {
         robot: robot.to_string(),
         body: body.clone(),
+        terrain: Vec::new(),
         voxels: rollout.voxels(),
         phases: Vec::new(),
         frames: Vec::new(),
@@ -325,6 +326,7 @@ pub fn moment(world: &World, body: &Body, stimulus: Grid<f64>) -> Recording {
     Recording {
         robot: String::new(),
         body: body.clone(),
+        terrain: Vec::new(),
         voxels: voxels(world),
         phases: vec![Phase {
             first_frame: 0,
