@@ -229,7 +229,8 @@ pub(crate) fn terrain(object: &TerrainObject, window: &Window, out: &mut Vec<Pri
         }
     }
     // Seams first, so that they do not cut the outline.
-    let is_seam = |side: &Primitive| matches!(side, Primitive::Line { colour, .. } if *colour == seams);
+    let is_seam =
+        |side: &Primitive| matches!(side, Primitive::Line { colour, .. } if *colour == seams);
     let (inner, outer): (Vec<_>, Vec<_>) = sides.into_iter().partition(is_seam);
     out.extend(inner);
     out.extend(outer);

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// Most places of points in a recording: some gigabyte.
-const MOST_PLACES: usize = 50_000_000;
+pub(crate) const MOST_PLACES: usize = 50_000_000;
 
 /// Converts world units to voxel lengths, in which distances are reported, as in the paper.
 pub(crate) fn voxel_lengths(world_units: f64, physics: &Physics) -> f64 {
@@ -25,6 +25,14 @@ pub fn place([x, y]: [f64; 2], physics: &Physics) -> [f64; 2] {
     [
         voxel_lengths(x, physics),
         voxel_lengths(y, physics) - f64::from(physics.ground_row),
+    ]
+}
+
+/// Acts as [`place`] for positions from another origin, added to them \[voxel lengths\].
+pub fn place_from([x, y]: [f64; 2], physics: &Physics, origin: [f64; 2]) -> [f64; 2] {
+    [
+        voxel_lengths(x, physics) + origin[0],
+        voxel_lengths(y, physics) + origin[1],
     ]
 }
 
@@ -351,7 +359,7 @@ fn frame(world: &World) -> Frame {
 }
 
 /// Returns the voxels with their corners, as indices into a [`frame`]'s points.
-fn voxels(world: &World) -> Vec<VoxelCorners> {
+pub(crate) fn voxels(world: &World) -> Vec<VoxelCorners> {
     let corner = |((row, column), corners)| VoxelCorners {
         row,
         column,

@@ -1,7 +1,17 @@
 //! Terrain in files: objects of fixed cells.
 
+use crate::base::error::Error;
+use crate::sim::{Start, System, Terrain, World};
+use crate::task::protocol::{MAX_COLUMN, MAX_ROW};
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::de::{DeserializeOwned, Error as _, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
+use std::fmt;
+use std::marker::PhantomData;
+use std::sync::Arc;
+
+/// Most objects of a terrain, and most rows of one.
+const MOST: usize = 1000;
 
 /// An object of fixed cells, as scenarios hold it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -12,6 +22,7 @@ pub struct TerrainObject {
     /// Row of its lower left cell; the floor lies below row 0.
     pub row: u32,
     /// Rows from the top, as EvoGym's numbers: 5 a fixed cell, 0 none.
+    #[serde(deserialize_with = "at_most_a_thousand")]
     pub grid: Vec<String>,
 }
 
@@ -30,6 +41,88 @@ impl TerrainObject {
     pub(crate) fn size(&self) -> [usize; 2] {
         [self.grid.first().map_or(0, String::len), self.grid.len()]
     }
+}
+
+/// Reads a list, and refuses one that is too long while it is read.
+pub(crate) fn at_most_a_thousand<'de, D, T>(reader: D) -> Result<Vec<T>, D::Error>
+where
+    D: Deserializer<'de>,
+    T: DeserializeOwned,
+{
+    struct Items<T>(PhantomData<T>);
+    impl<'de, T: DeserializeOwned> Visitor<'de> for Items<T> {
+        type Value = Vec<T>;
+        fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+            f.write_str("a list")
+        }
+        fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Vec<T>, A::Error> {
+            let mut items = Vec::new();
+            while let Some(item) = list.next_element()? {
+                if items.len() == MOST {
+                    return Err(A::Error::custom(format!("expected at most {MOST}")));
+                }
+                items.push(item);
+            }
+            Ok(items)
+        }
+    }
+    reader.deserialize_seq(Items(PhantomData))
+}
+
+/// Builds the terrain of some objects.
+///
+/// # Errors
+/// Returns an error that names the object if a grid is wrong, or the terrain is refused.
+pub fn built(objects: &[TerrainObject]) -> Result<Arc<Terrain>, Error> {
+    if objects.is_empty() {
+        return Err(Error::input(
+            "terrain: expected at least one object".to_string(),
+        ));
+    }
+    for (number, object) in objects.iter().enumerate() {
+        let refuse = |text: String| Err(Error::input(format!("terrain[{number}].{text}")));
+        let columns = -MAX_COLUMN..=MAX_COLUMN;
+        if !columns.contains(&object.column) {
+            return refuse(format!("column: expected −{MAX_COLUMN} to {MAX_COLUMN}"));
+        }
+        if object.row > MAX_ROW {
+            return refuse(format!("row: {}, expected 0 to {MAX_ROW}", object.row));
+        }
+        let [width, _] = object.size();
+        if width == 0 {
+            return refuse("grid: expected at least one cell".to_string());
+        }
+        for (row, cells) in object.grid.iter().enumerate() {
+            if !cells.bytes().all(|cell| matches!(cell, b'0' | b'5')) {
+                return refuse(format!("grid[{row}]: expected 0 (none) and 5 (fixed) only"));
+            }
+            if cells.len() != width {
+                let found = cells.len();
+                return refuse(format!(
+                    "grid[{row}]: {found} cells, expected {width} as in the row above"
+                ));
+            }
+        }
+    }
+    simulated(objects)
+}
+
+/// STUB
+fn simulated(_: &[TerrainObject]) -> Result<Arc<Terrain>, Error> {
+    Ok(Arc::new(Terrain))
+}
+
+/// Places a robot at rest on terrain.
+///
+/// # Errors
+/// Returns an error if it has no room there.
+pub fn placed(
+    system: impl Into<Arc<System>>,
+    start: Start,
+    terrain: Arc<Terrain>,
+) -> Result<World, Error> {
+    World::on_terrain(system, start, terrain)
+        .map_err(|error| Error::input(format!("terrain: {error}")))
 }
 
 #[cfg(test)]
