@@ -15,7 +15,7 @@ use crate::store::folder;
 use crate::task::class_names::ClassNames;
 use crate::task::protocol::{MAX_COLUMN, MAX_ROW, MAX_STEPS};
 use crate::task::recording::{Frame, LabelledStimulus, Phase, Recording};
-use crate::task::rollout::{MOST_PLACES, place_from, voxels};
+use crate::task::rollout::{MOST_PLACES, frame_from, place_from, voxels};
 use crate::task::terrain::{self, TerrainObject, at_most_a_thousand};
 use schemars::JsonSchema;
 use serde::de::{Error as _, SeqAccess, Visitor};
@@ -387,10 +387,7 @@ impl<'a> Simulation<'a> {
     }
 
     fn frame(&self) -> Frame {
-        Frame {
-            points: self.world.points().map(|at| self.lengths(at)).collect(),
-            centre: self.lengths(self.world.centre_of_mass()),
-        }
+        frame_from(&self.world, self.scenario.origin())
     }
 }
 

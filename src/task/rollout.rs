@@ -9,6 +9,7 @@ use crate::sim::{Energy, Physics, Start, StepError, System, Unstable, World, Wor
 use crate::task::class_names::ClassNames;
 use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::recording::{Frame, LabelledStimulus, Phase, Recording, VoxelCorners};
+use crate::task::terrain::TerrainObject;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -320,11 +321,18 @@ pub fn record_unless(
     Ok(recording)
 }
 
-/// Records the start of a simulation and its present moment under a stimulus, for a picture.
-pub fn moment(world: &World, body: &Body, stimulus: Grid<f64>) -> Recording {
+/// Records the start of a simulation and its present moment under a stimulus, for a picture, with
+/// positions from an origin as [`place_from`] takes it.
+pub fn moment(
+    world: &World,
+    body: &Body,
+    stimulus: Grid<f64>,
+    terrain: &[TerrainObject],
+    origin: [f64; 2],
+) -> Recording {
     let mut start = world.clone();
     start.reset();
-    let frames = vec![frame(&start), frame(world)];
+    let frames = vec![frame_from(&start, origin), frame_from(world, origin)];
     let seen = LabelledStimulus {
         class: 0,
         label: "now".to_string(),
@@ -334,7 +342,7 @@ pub fn moment(world: &World, body: &Body, stimulus: Grid<f64>) -> Recording {
     Recording {
         robot: String::new(),
         body: body.clone(),
-        terrain: Vec::new(),
+        terrain: terrain.to_vec(),
         voxels: voxels(world),
         phases: vec![Phase {
             first_frame: 0,
@@ -352,6 +360,15 @@ pub fn moment(world: &World, body: &Body, stimulus: Grid<f64>) -> Recording {
 
 fn frame(world: &World) -> Frame {
     let place = |at: [f64; 2]| place(at, world.system().physics());
+    Frame {
+        points: world.points().map(place).collect(),
+        centre: place(world.centre_of_mass()),
+    }
+}
+
+/// Returns the present moment with positions from an origin as [`place_from`] takes it.
+pub(crate) fn frame_from(world: &World, origin: [f64; 2]) -> Frame {
+    let place = |at: [f64; 2]| place_from(at, world.system().physics(), origin);
     Frame {
         points: world.points().map(place).collect(),
         centre: place(world.centre_of_mass()),
