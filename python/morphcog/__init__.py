@@ -435,8 +435,7 @@ class World:
 
     def set_targets(self, targets):
         """Sets the length that each actuator aims at from the next control step on, in voxel lengths (EvoGym's
-        action): float64 (actuators,), row-major, clipped to 0.6 to 1.6. Actuators are all voxels of material 3 to 8.
-        They follow the targets until a stimulus is assigned."""
+        action): float64 (actuators,), row-major, clipped to 0.6 to 1.6. Actuators are voxels of material 7 and 8."""
         targets = _array(targets, _np.float64, 1, "targets", "a length for each actuator")
         with self._turn:
             self._world.set_targets(targets)
@@ -893,17 +892,25 @@ def _members(about):
     return _pandas().DataFrame(rows, columns=[*columns, "accuracy"])
 
 
-def from_evogym(structure, *, driven=False):
+def from_evogym(structure, *, driven=None):
     """A body from EvoGym's numbers of voxels (0 empty, 1 rigid, 2 soft, 3 horizontal and 4 vertical actuator).
 
-    World.step(actions) sets the lengths of all actuators, whatever they become here. Without actions, horizontal ones
-    are muscles in phase, which oscillate by themselves, or, with driven=True, expanding sensors, whose pixel is
-    EvoGym's action less 0.6: a controller sets World.stimulus at every step. Vertical ones follow actions only.
+    driven="targets" makes actuators (7 and 8), whose lengths World.step(actions) sets, as in EvoGym; a structure with
+    vertical actuators has them without asking. Otherwise horizontal actuators become muscles in phase, which oscillate
+    by themselves, or, with driven=True, expanding sensors, whose pixel is EvoGym's action less 0.6: a controller sets
+    World.stimulus at every step.
     """
     structure = _array(structure, _np.uint8, 2, "structure", "EvoGym's voxels 0 to 4 of shape (rows, columns)")
     if (structure > 4).any():
         raise Error(f"structure: expected EvoGym's voxels 0 to 4, found {structure.max()}")
+    vertical = (structure == 4).any()
+    if driven is None:
+        driven = "targets" if vertical else False
+    if driven not in (True, False, "targets"):
+        raise Error(f'driven={driven!r}: expected True, False or "targets"')
+    if vertical and driven != "targets":
+        raise Error(f'driven={driven!r}: 4 is EvoGym\'s vertical actuator, which only World.step(actions) drives: expected driven="targets"')
     body = structure.copy()
-    body[structure == 3] = 6 if driven else 3
+    body[structure == 3] = {True: 6, False: 3, "targets": 7}[driven]
     body[structure == 4] = 8
     return body

@@ -70,7 +70,7 @@ def _terrain(value):
         if not all(isinstance(row, str) for row in grid):
             rows = _array(grid, _np.uint8, 2, f"{what}.grid", "rows of 0 (empty) and 5 (fixed)")
             grid = ["".join(map(str, row)) for row in rows]
-        column = _whole(given["column"], f"{what}.column", -_MOST_COLUMN, _MOST_COLUMN)
+        column = _whole(given["column"], f"{what}.column", 0, _MOST_COLUMN)
         row = _whole(given["row"], f"{what}.row", 0, _morphcog.MAX_ROW)
         if column is None or row is None:
             raise Error(f"{what}: expected whole numbers as column and row")

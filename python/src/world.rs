@@ -9,7 +9,7 @@ use morphcog::body::Body;
 use morphcog::sim::{FloatEnvironment, Start, System};
 use morphcog::task::protocol::MAX_ROW;
 use morphcog::task::rollout::{moment, place_from};
-use morphcog::task::terrain::{TerrainObject, built, placed};
+use morphcog::task::terrain::{FixedObject, built, placed};
 use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
@@ -23,8 +23,6 @@ const STEPS: u64 = 20;
 pub(crate) struct WorldData {
     simulation: Mutex<Simulation>,
     body: Body,
-    /// The fixed objects; none on flat ground.
-    terrain: Vec<TerrainObject>,
 }
 
 #[derive(Clone)]
@@ -44,7 +42,7 @@ impl WorldData {
         start_column: Option<i64>,
         start_row: Option<u32>,
         config: Option<&ConfigData>,
-        terrain: Option<Vec<(i64, u32, Vec<String>)>>,
+        terrain: Option<Vec<(u32, u32, Vec<String>)>>,
     ) -> PyResult<Self> {
         let _environment = entered()?;
         let body = body(&voxels, "body")?;
@@ -73,17 +71,17 @@ impl WorldData {
             Some(_) => [start.column as f64, 0.0],
         };
         let system = System::new(&body, physics);
-        let objects: Vec<TerrainObject> = terrain
-            .iter()
-            .flatten()
-            .cloned()
-            .map(|(column, row, grid)| TerrainObject { column, row, grid })
-            .collect();
         let world = match terrain {
             None => morphcog::sim::World::new(system, start),
-            Some(_) => built(&objects)
-                .and_then(|terrain| placed(system, start, terrain))
-                .map_err(|error| raised(&error))?,
+            Some(objects) => {
+                let objects = objects.into_iter();
+                let objects: Vec<FixedObject> = objects
+                    .map(|(column, row, grid)| FixedObject { column, row, grid })
+                    .collect();
+                built(&objects, system.physics().cell_size)
+                    .and_then(|terrain| placed(system, start, terrain))
+                    .map_err(|error| raised(&error))?
+            }
         };
         Ok(WorldData {
             simulation: Mutex::new(Simulation {
@@ -92,7 +90,6 @@ impl WorldData {
                 origin,
             }),
             body,
-            terrain: objects,
         })
     }
 
@@ -101,7 +98,6 @@ impl WorldData {
         WorldData {
             simulation: Mutex::new(self.simulation(py).clone()),
             body: self.body.clone(),
-            terrain: self.terrain.clone(),
         }
     }
 
@@ -111,13 +107,7 @@ impl WorldData {
         let stimulus = seen(pixels.as_array(), &self.body)?;
         let simulation = self.simulation(py);
         let world = &simulation.world;
-        let recording = moment(
-            world,
-            &self.body,
-            stimulus,
-            &self.terrain,
-            simulation.origin,
-        );
+        let recording = moment(world, &self.body, stimulus, simulation.origin);
         Ok(RecordingData::new(recording))
     }
 

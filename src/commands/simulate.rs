@@ -1,4 +1,4 @@
-//! `morphcog simulate`: simulates any body under any stimuli or targets, on any terrain.
+//! `morphcog simulate`: simulates any body under any stimuli and targets, on any terrain.
 
 mod targets;
 
@@ -16,7 +16,7 @@ use crate::task::class_names::ClassNames;
 use crate::task::protocol::{MAX_COLUMN, MAX_ROW, MAX_STEPS};
 use crate::task::recording::{Frame, LabelledStimulus, Phase, Recording};
 use crate::task::rollout::{MOST_PLACES, frame_from, place_from, voxels};
-use crate::task::terrain::{self, TerrainObject, at_most_a_thousand};
+use crate::task::terrain::{self, FixedObject, at_most_a_thousand};
 use schemars::JsonSchema;
 use serde::de::{Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
@@ -26,7 +26,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use targets::{Targets, TargetsForm};
 
-/// A body, its stimuli or targets, its ground, and the length of the simulation.
+/// A body, its stimuli and targets, its ground, and the length of the simulation.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
@@ -44,13 +44,13 @@ pub struct Scenario {
     /// True if the robot returns to its initial state at every switch.
     #[serde(default)]
     reset_between: bool,
-    /// Instead of stimuli: the length that each actuator is asked for at every control step.
+    /// The length of each actuator at every control step; without targets, they rest.
     #[schemars(with = "Option<TargetsForm>")]
     targets: Option<Targets>,
     /// Objects of fixed cells on which the body starts, instead of the flat ground.
     #[serde(default, deserialize_with = "some_objects")]
-    #[schemars(with = "Option<Vec<TerrainObject>>")]
-    terrain: Option<Vec<TerrainObject>>,
+    #[schemars(with = "Option<Vec<FixedObject>>")]
+    terrain: Option<Vec<FixedObject>>,
     /// Grid column of the body's left edge; 493 if it is not given, needed with terrain.
     start_column: Option<i64>,
     /// Grid row of its bottom row: 2 is on the flat ground; needed with terrain, whose rows count
@@ -115,7 +115,7 @@ fn bounded<'de, D: Deserializer<'de>>(reader: D) -> Result<Option<Vec<Grid<f64>>
 
 fn some_objects<'de, D: Deserializer<'de>>(
     reader: D,
-) -> Result<Option<Vec<TerrainObject>>, D::Error> {
+) -> Result<Option<Vec<FixedObject>>, D::Error> {
     at_most_a_thousand(reader).map(Some)
 }
 
@@ -200,9 +200,6 @@ impl Scenario {
             }
         }
         if let Some(targets) = &self.targets {
-            if !self.stimuli().is_empty() {
-                return refuse("targets: expected either targets or stimuli, not both".to_string());
-            }
             targets
                 .validate(self.actuators().count())
                 .map_err(Error::input)?;
@@ -256,7 +253,10 @@ impl Scenario {
         let system = System::new(&self.body, self.physics.clone());
         match &self.terrain {
             None => Ok(World::new(system, self.start())),
-            Some(objects) => terrain::placed(system, self.start(), terrain::built(objects)?),
+            Some(objects) => {
+                let terrain = terrain::built(objects, self.physics.cell_size)?;
+                terrain::placed(system, self.start(), terrain)
+            }
         }
     }
 
@@ -273,7 +273,7 @@ impl Scenario {
     fn actuators(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         let voxels = self.body.voxels().iter();
         voxels
-            .filter(|(_, material): &(_, &Material)| material.is_active())
+            .filter(|(_, material): &(_, &Material)| material.is_actuator())
             .map(|(place, _)| place)
     }
 
@@ -393,8 +393,8 @@ impl<'a> Simulation<'a> {
 
 /// Simulates the scenario and passes the CSV to `line`, line by line: `step,com_x,com_y`, then the
 /// centre of mass before the first and after every control step. `points` adds every point
-/// (`x_0,y_0`, …, in EvoGym's order) and pixel (`pixel_ROW_COLUMN`) or target (`target_ROW_COLUMN`)
-/// of that step. Positions are in voxel lengths: x from the body's left edge at the start, y from
+/// (`x_0,y_0`, …, in EvoGym's order), pixel (`pixel_ROW_COLUMN`) and actuator's target
+/// (`target_ROW_COLUMN`) of that step. Positions are in voxel lengths: x from the body's left edge at the start, y from
 /// the ground; on terrain x from column 0, y from row 0.
 ///
 /// # Errors
@@ -409,15 +409,11 @@ pub fn simulate(
     if points {
         (0..simulation.world.points().count())
             .for_each(|number| header += &format!(",x_{number},y_{number}"));
-        match scenario.targets {
-            Some(_) => scenario
-                .actuators()
-                .for_each(|(row, column)| header += &format!(",target_{row}_{column}")),
-            None => simulation
-                .dark
-                .iter()
-                .for_each(|((row, column), _)| header += &format!(",pixel_{row}_{column}")),
-        }
+        let pixels = simulation.dark.iter().map(|(place, _)| ("pixel", place));
+        let targets = scenario.actuators().map(|place| ("target", place));
+        pixels
+            .chain(targets)
+            .for_each(|(what, (row, column))| header += &format!(",{what}_{row}_{column}"));
     }
     line(header + "\n")?;
     let mut row = |simulation: &Simulation| {
@@ -427,11 +423,8 @@ pub fn simulate(
         if points {
             let all = simulation.world.points().map(lengths);
             all.for_each(|[x, y]| text += &format!(",{x},{y}"));
-            let inputs = match scenario.targets {
-                Some(_) => &simulation.targets,
-                None => simulation.shown().cells(),
-            };
-            inputs.iter().for_each(|input| text += &format!(",{input}"));
+            let inputs = simulation.shown().cells().iter().chain(&simulation.targets);
+            inputs.for_each(|input| text += &format!(",{input}"));
         }
         line(text + "\n")
     };
@@ -468,7 +461,7 @@ pub(crate) fn record(
     let mut recording = Recording {
         robot: name.to_string(),
         body: scenario.body.clone(),
-        terrain: scenario.terrain.clone().unwrap_or_default(),
+        terrain: simulation.world.terrain().cloned(),
         voxels: voxels(&simulation.world),
         phases: Vec::new(),
         frames: vec![start.clone()],

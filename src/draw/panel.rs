@@ -297,11 +297,14 @@ fn readouts(
     line([0.0, 83.0], &note, SMALL, false, colour);
 }
 
+/// Returns all materials, those that do not evolve last.
+pub(crate) fn known() -> impl Iterator<Item = Material> {
+    Material::ALL.into_iter().chain(Material::ACTUATORS)
+}
+
 /// Returns the materials of a body.
 pub(crate) fn present(body: &Body) -> impl Iterator<Item = Material> {
-    Material::ALL
-        .into_iter()
-        .filter(|m| !m.is_empty() && body.voxels().cells().contains(m))
+    known().filter(|m| !m.is_empty() && body.voxels().cells().contains(m))
 }
 
 fn legend(walk: &Walk, [x, y]: [f64; 2], z: f64, out: &mut Vec<Primitive>) {

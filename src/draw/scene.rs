@@ -4,7 +4,7 @@
 use crate::draw::colour;
 use crate::draw::colour::Colour;
 use crate::draw::walk::{Walk, area};
-use crate::task::terrain::TerrainObject;
+use crate::sim::TerrainObject;
 use std::fmt;
 use std::str::FromStr;
 
@@ -130,7 +130,8 @@ pub(crate) fn ruler(window: &Window, zero: f64, step: f64) -> impl Iterator<Item
 /// path of the centre of mass. The ruler's zero is the centre of mass at the start of the rollout.
 pub(crate) fn world(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
     let mut out = ground(walk, frame, window);
-    for object in &walk.recording().terrain {
+    let objects = walk.recording().terrain.iter();
+    for object in objects.flat_map(|terrain| terrain.objects()) {
         terrain(object, window, &mut out);
     }
     out.extend(body(walk, frame, window));
@@ -194,15 +195,20 @@ pub(crate) fn terrain(object: &TerrainObject, window: &Window, out: &mut Vec<Pri
     };
     let (seams, outline) = (colour::PAPER, colour::GROUND_LINE);
     let mut sides = Vec::new();
-    let [columns, rows] = object.size().map(|size| size as i64);
+    let (left, low) = (i64::from(object.column), i64::from(object.row));
+    let (columns, rows) = (object.cells.width() as i64, object.cells.height() as i64);
+    let is_fixed = |[column, row]: [i64; 2]| {
+        let (down, right) = (low + rows - 1 - row, column - left);
+        object.cells.get(down as isize, right as isize) == Some(&true)
+    };
     // The cells in the window; casts saturate.
     let within = |first: i64, count: i64, low: f64, high: f64| {
         let end = first.saturating_add(count);
         (low.floor() as i64).clamp(first, end)..(high.ceil() as i64).clamp(first, end)
     };
-    for row in within(object.row.into(), rows, window.bottom, window.top) {
-        for column in within(object.column, columns, window.left, window.right) {
-            if !object.is_fixed([column, row]) {
+    for row in within(low, rows, window.bottom, window.top) {
+        for column in within(left, columns, window.left, window.right) {
+            if !is_fixed([column, row]) {
                 continue;
             }
             let ([left, bottom], [right, top]) = (
@@ -220,7 +226,7 @@ pub(crate) fn terrain(object: &TerrainObject, window: &Window, out: &mut Vec<Pri
                 ([column, row - 1], [[right, bottom], [left, bottom]]),
                 ([column - 1, row], [[left, bottom], [left, top]]),
             ] {
-                match object.is_fixed(beside) {
+                match is_fixed(beside) {
                     true if window.scale >= MARKED => sides.push(line(&side, 1.0, seams)),
                     true => {}
                     false => sides.push(line(&side, 1.5, outline)),

@@ -65,7 +65,7 @@ impl Stage {
         let (smallest, largest) = (VOXEL.start() * zoom, VOXEL.end() * zoom);
         let (first, all) = (walk.extent(0..1), walk.extent(0..walk.frames()));
         let size = (first.right - first.left).clamp(1.0, 128.0);
-        let is_flat = walk.recording().terrain.is_empty();
+        let is_flat = walk.recording().terrain.is_none();
         let top = match is_flat {
             true => {
                 let standing = first.top.clamp(1.0, 128.0);

@@ -2,12 +2,13 @@
 
 use crate::base::Grid;
 use crate::body::Body;
+use crate::sim::Terrain;
 use crate::task::answer::Readout;
 use crate::task::class_names::ClassNames;
 use crate::task::margins::Margins;
 use crate::task::stimulus::StimulusParams;
-use crate::task::terrain::TerrainObject;
 use serde::{Serialize, Serializer};
+use std::sync::Arc;
 
 /// An image of which a body covers a part: pictures frame that part in it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -101,8 +102,8 @@ pub struct Recording {
     /// The robot's id or name.
     pub(crate) robot: String,
     pub(crate) body: Body,
-    /// The fixed objects of its world; none on flat ground.
-    pub(crate) terrain: Vec<TerrainObject>,
+    /// Its terrain; `None` is flat ground.
+    pub(crate) terrain: Option<Arc<Terrain>>,
     /// Its voxels with their corners, row-major; fixed for the rollout.
     pub voxels: Vec<VoxelCorners>,
     /// The phases in order, at least one; the first starts at frame 0.

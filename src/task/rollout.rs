@@ -9,7 +9,6 @@ use crate::sim::{Energy, Physics, Start, StepError, System, Unstable, World, Wor
 use crate::task::class_names::ClassNames;
 use crate::task::protocol::{Protocol, RolloutMode};
 use crate::task::recording::{Frame, LabelledStimulus, Phase, Recording, VoxelCorners};
-use crate::task::terrain::TerrainObject;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -281,7 +280,7 @@ pub fn record_unless(
     let mut recording = Recording {
         robot: robot.to_string(),
         body: body.clone(),
-        terrain: Vec::new(),
+        terrain: None,
         voxels: rollout.voxels(),
         phases: Vec::new(),
         frames: Vec::new(),
@@ -323,13 +322,7 @@ pub fn record_unless(
 
 /// Records the start of a simulation and its present moment under a stimulus, for a picture, with
 /// positions from an origin as [`place_from`] takes it.
-pub fn moment(
-    world: &World,
-    body: &Body,
-    stimulus: Grid<f64>,
-    terrain: &[TerrainObject],
-    origin: [f64; 2],
-) -> Recording {
+pub fn moment(world: &World, body: &Body, stimulus: Grid<f64>, origin: [f64; 2]) -> Recording {
     let mut start = world.clone();
     start.reset();
     let frames = vec![frame_from(&start, origin), frame_from(world, origin)];
@@ -342,7 +335,7 @@ pub fn moment(
     Recording {
         robot: String::new(),
         body: body.clone(),
-        terrain: terrain.to_vec(),
+        terrain: world.terrain().cloned(),
         voxels: voxels(world),
         phases: vec![Phase {
             first_frame: 0,

@@ -1,8 +1,8 @@
 //! Terrain in files: objects of fixed cells.
 
+use crate::base::Grid;
 use crate::base::error::Error;
-use crate::sim::{Start, System, Terrain, World};
-use crate::task::protocol::{MAX_COLUMN, MAX_ROW};
+use crate::sim::{Start, System, Terrain, TerrainObject, World};
 use schemars::JsonSchema;
 use serde::de::{DeserializeOwned, Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
@@ -16,31 +16,14 @@ const MOST: usize = 1000;
 /// An object of fixed cells, as scenarios hold it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct TerrainObject {
+pub struct FixedObject {
     /// Column of its lower left cell.
-    pub column: i64,
+    pub column: u32,
     /// Row of its lower left cell; the floor lies below row 0.
     pub row: u32,
     /// Rows from the top, as EvoGym's numbers: 5 a fixed cell, 0 none.
     #[serde(deserialize_with = "at_most_a_thousand")]
     pub grid: Vec<String>,
-}
-
-impl TerrainObject {
-    /// Returns true for a cell that is fixed, by its column and row in the world.
-    pub(crate) fn is_fixed(&self, [column, row]: [i64; 2]) -> bool {
-        let down = i64::from(self.row) + self.grid.len() as i64 - 1 - row;
-        let cell = usize::try_from(down).ok().and_then(|down| {
-            let right = usize::try_from(column.checked_sub(self.column)?).ok()?;
-            self.grid.get(down)?.as_bytes().get(right)
-        });
-        cell == Some(&b'5')
-    }
-
-    /// Returns the number of columns and rows.
-    pub(crate) fn size(&self) -> [usize; 2] {
-        [self.grid.first().map_or(0, String::len), self.grid.len()]
-    }
 }
 
 /// Reads a list, and refuses one that is too long while it is read.
@@ -69,11 +52,11 @@ where
     reader.deserialize_seq(Items(PhantomData))
 }
 
-/// Builds the terrain of some objects.
+/// Builds the terrain of some objects; `cell_size` \[wu\] is that of the physics.
 ///
 /// # Errors
 /// Returns an error that names the object if a grid is wrong, or the terrain is refused.
-pub fn built(objects: &[TerrainObject]) -> Result<Arc<Terrain>, Error> {
+pub fn built(objects: &[FixedObject], cell_size: f64) -> Result<Arc<Terrain>, Error> {
     if objects.is_empty() {
         return Err(Error::input(
             "terrain: expected at least one object".to_string(),
@@ -81,14 +64,7 @@ pub fn built(objects: &[TerrainObject]) -> Result<Arc<Terrain>, Error> {
     }
     for (number, object) in objects.iter().enumerate() {
         let refuse = |text: String| Err(Error::input(format!("terrain[{number}].{text}")));
-        let columns = -MAX_COLUMN..=MAX_COLUMN;
-        if !columns.contains(&object.column) {
-            return refuse(format!("column: expected −{MAX_COLUMN} to {MAX_COLUMN}"));
-        }
-        if object.row > MAX_ROW {
-            return refuse(format!("row: {}, expected 0 to {MAX_ROW}", object.row));
-        }
-        let [width, _] = object.size();
+        let width = object.grid.first().map_or(0, String::len);
         if width == 0 {
             return refuse("grid: expected at least one cell".to_string());
         }
@@ -104,12 +80,19 @@ pub fn built(objects: &[TerrainObject]) -> Result<Arc<Terrain>, Error> {
             }
         }
     }
-    simulated(objects)
-}
-
-/// STUB
-fn simulated(_: &[TerrainObject]) -> Result<Arc<Terrain>, Error> {
-    Ok(Arc::new(Terrain))
+    let simulated = |object: &FixedObject| TerrainObject {
+        column: object.column,
+        row: object.row,
+        cells: Grid::from_fn(
+            object.grid.len(),
+            object.grid.first().map_or(0, String::len),
+            |row, column| object.grid[row].as_bytes()[column] == b'5',
+        ),
+    };
+    let objects: Vec<TerrainObject> = objects.iter().map(simulated).collect();
+    Terrain::new(&objects, cell_size)
+        .map(Arc::new)
+        .map_err(|error| Error::input(format!("terrain: {error}")))
 }
 
 /// Places a robot at rest on terrain.
@@ -129,19 +112,39 @@ pub fn placed(
 mod tests {
     use super::*;
 
+    fn object(column: u32, row: u32, grid: &[&str]) -> FixedObject {
+        let grid = grid.iter().map(|row| row.to_string()).collect();
+        FixedObject { column, row, grid }
+    }
+
     #[test]
     fn rows_of_the_grid_go_down_from_the_top_and_rows_of_the_world_up() {
-        let stairs = TerrainObject {
-            column: 3,
-            row: 2,
-            grid: vec!["005".to_string(), "055".to_string()],
-        };
+        let stairs = built(&[object(3, 2, &["005", "055"])], 0.1).unwrap();
         let fixed: Vec<[i64; 2]> = (0..6)
             .flat_map(|row| (0..9).map(move |column| [column, row]))
-            .filter(|cell| stairs.is_fixed(*cell))
+            .filter(|[column, row]| stairs.is_fixed(*column, *row))
             .collect();
         assert_eq!(fixed, [[4, 2], [5, 2], [5, 3]]);
-        assert_eq!(stairs.size(), [3, 2]);
-        assert!(!stairs.is_fixed([i64::MIN, i64::MAX]));
+    }
+
+    #[test]
+    fn what_is_no_terrain_is_refused_with_its_object_and_row() {
+        let floor = object(0, 0, &["555"]);
+        let refused = |objects: &[FixedObject]| built(objects, 0.1).unwrap_err().message;
+        assert!(refused(&[]).contains("at least one object"));
+        for (grid, words) in [
+            (&[][..], "terrain[1].grid: expected at least one cell"),
+            (&[""], "terrain[1].grid: expected at least one cell"),
+            (&["5", "55"], "terrain[1].grid[1]: 2 cells, expected 1"),
+            (&["56"], "terrain[1].grid[0]: expected 0"),
+            (&["5é"], "terrain[1].grid[0]: expected 0"),
+            (&["0"], "no cell"),
+            (&["505"], "several pieces"),
+        ] {
+            let said = refused(&[floor.clone(), object(9, 0, grid)]);
+            assert!(said.contains(words), "{grid:?}: {said}");
+        }
+        assert!(refused(&[floor.clone(), floor.clone()]).contains("overlap"));
+        assert!(refused(&[object(u32::MAX, u32::MAX, &["5"])]).contains("too much"));
     }
 }

@@ -53,7 +53,7 @@ impl Targets {
         let counted = |found: usize, key: &str| match found == actuators {
             true => Ok(()),
             false => Err(format!(
-                "{key}: expected a number for each of the body's {actuators} actuators (materials 3 to 8), found {found}"
+                "{key}: expected a number for each of the body's {actuators} actuators (7 and 8), found {found}"
             )),
         };
         match self {
