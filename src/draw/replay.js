@@ -301,6 +301,8 @@
     button.onclick = () => { arrange(true); seek(firstFrame()); if (!playing) play(true); }; $("phases").append(button);
   }
   const used = new Set(rollout.voxels.map(([m]) => m));
+  // A body that only targets drive (materials 7 and 8) sees nothing.
+  $("stimulus").parentElement.hidden = (used.has(7) || used.has(8)) && ![...used].some((m) => rollout.materials.list[m].sensor);
   rollout.materials.list.forEach((m, k) => {
     if (!used.has(k)) return;
     const item = document.createElement("li");

@@ -26,13 +26,13 @@ pub(crate) enum Targets {
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Wave {
-    /// Mean target [voxel lengths].
+    /// Mean target, in voxel lengths.
     mean: f64,
-    /// Amplitude [voxel lengths]; targets are clipped to 0.6 to 1.6.
+    /// Amplitude, in voxel lengths; targets are clipped to 0.6 to 1.6.
     amplitude: f64,
     /// Control steps of a cycle.
     period: f64,
-    /// Phase of each actuator [radians].
+    /// Phase of each actuator, in radians.
     phases: Vec<f64>,
 }
 
