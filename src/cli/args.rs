@@ -189,7 +189,7 @@ scenario.json:
 
 body: rows from the top; 0 empty, 1 rigid, 2 soft, 3 and 4 muscle (in phase, antiphase), 5 and 6 \
 sensor (shrinks, expands), 7 and 8 actuator (horizontal, vertical). stimulus: one pixel per voxel, 0 to 1; or \
-\"stimuli\": [...] with \"switch_every\": 500; or targets of all actuators, in voxel lengths:
+\"stimuli\": [...] with \"switch_every\": 500; and targets of actuators, in voxel lengths:
   \"targets\": {\"mean\": 1.1, \"amplitude\": 0.5,
     \"period\": 25, \"phases\": [0, 1.7, 3.4, 5.1]}
 or a list for each control step. Fixed cells (5) instead of the flat ground:
@@ -197,7 +197,7 @@ or a list for each control step. Fixed cells (5) instead of the flat ground:
     \"grid\": [\"0000000055\", \"5555555555\"]}]
 
 Output: step,com_x,com_y in voxel lengths, x from the body's left edge at the start, y from the ground (on \
-terrain from column 0 and row 0); with --points also x_0,y_0,… and pixel_0_0,… or target_0_0,…. \
+terrain from column 0 and row 0); with --points also x_0,y_0,… and pixel_0_0,…, target_0_0,…. \
 Exit code 4 if the rollout becomes unstable.")]
     Simulate(SimulateArgs),
     /// Draw a digit and watch robots walk, in the browser.
@@ -430,7 +430,7 @@ pub(super) struct SimulateArgs {
     /// .mp4, .webm; a folder, such as frames/, takes a film's frames).
     #[arg(short, long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
-    /// Write every point and every pixel or target as well.
+    /// Write every point, pixel and target as well.
     #[arg(long)]
     pub(super) points: bool,
     /// Width of pictures in pixels (default: 480, films 1280).

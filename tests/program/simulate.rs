@@ -352,8 +352,11 @@ fn listed_targets_move_actuators_as_their_wave_does() {
         assert!((a - b).abs() < 1e-9, "{a} and {b}");
     }
     assert!(wave[1][wave[1].len() - 3..] != wave[9][wave[1].len() - 3..]);
-    // Without targets, actuators hold still.
-    sandbox.write("s.json", "{\"body\": [[7, 8]], \"control_steps\": 40}");
+    // Without targets, actuators hold still: nothing pushes sideways in free fall.
+    sandbox.write(
+        "s.json",
+        "{\"body\": [[7, 8]], \"control_steps\": 40, \"start_row\": 90}",
+    );
     let still = rows(&sandbox.run("simulate s.json").ended(0, &[]).out);
     assert!((still[40][0] - still[0][0]).abs() < 1e-6);
 }
