@@ -492,6 +492,35 @@ fn the_one(
 }
 
 fn run_simulate(args: &SimulateArgs, console: &Console) -> Result<(), Error> {
+    let out = args.out.as_deref();
+    let pictures = out.map(pictures::PicturesWanted::by_ending).transpose()?;
+    if let Some(wanted) = pictures.flatten() {
+        if args.points {
+            let text = "expected only with a table, such as --out points.csv".to_string();
+            return Err(Error::usage(text).about("points"));
+        }
+        let stop = signals::stop_flag()?;
+        let scenario = simulate::Scenario::read(&args.scenario)?;
+        let name = match args.scenario.file_stem() {
+            Some(name) if args.scenario != Path::new("-") => name.to_string_lossy().into_owned(),
+            _ => "scenario".to_string(),
+        };
+        let (replay, outcome) = simulate::record(&scenario, &name, &stop)?;
+        let width = args.width;
+        let made = pictures::write(
+            console,
+            &replay,
+            &pictures::PicturesWanted { width, ..wanted },
+            &stop,
+        )?;
+        made.iter()
+            .for_each(|path| console.line_about(path, &format!("wrote {}", path.display())));
+        return outcome;
+    }
+    if args.width.is_some() {
+        let text = "expected only with a picture or film, such as --out walk.gif".to_string();
+        return Err(Error::usage(text).about("width"));
+    }
     match &args.out {
         Some(path) => simulate::to_file(
             &args.scenario,

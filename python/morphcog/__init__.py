@@ -33,7 +33,7 @@ from ._morphcog import Error, Stopped, Unstable, __version__
 from ._pictures import Figure, Recording
 from ._progress import Progress as _Progress
 from ._progress import main_is_interrupted as _main_is_interrupted
-from ._values import _array, _body, _changes, _images, _path, _stimuli, _threads, _whole
+from ._values import _MOST_COLUMN, _array, _body, _changes, _images, _path, _stimuli, _terrain, _threads, _whole
 
 __all__ = [
     "Config",
@@ -391,17 +391,27 @@ def _stream(seed, generation, child):
 
 
 class World:
-    """One simulation of a body on flat ground, step by step; threads that share it take turns. A copy
+    """One simulation of a body on flat ground or terrain, step by step; threads that share it take turns. A copy
     (copy.copy) goes on by itself from the same state.
 
-    The stimulus may change at every control step. config: whose physics and start are used (default:
-    the paper's). start_row: row of the body's bottom row at the start, 2 stands on the ground.
+    The stimulus, or the targets of all actuators, may change at every control step. config: whose physics and start
+    are used (default: the paper's). start_row: row of the body's bottom row at the start, 2 stands on flat ground;
+    start_column: of its left edge.
+
+    terrain: objects of fixed cells instead of the flat ground, as dicts: column and row of the lower left cell, and
+    grid, its rows from the top, 5 fixed and 0 empty: [{"column": 0, "row": 0, "grid": ["0005", "5555"]}]. Rows count
+    from 0, and the start must be given. Points and centre are then in voxel lengths from column 0 and row 0.
     """
 
-    def __init__(self, body, *, start_row=None, config=None):
+    def __init__(self, body, *, start_row=None, config=None, start_column=None, terrain=None):
         body = _body(body)
         start_row = _whole(start_row, "start_row", 0, _morphcog.MAX_ROW)
-        self._world = _morphcog.WorldData(body, start_row, _config(config))
+        start_column = _whole(start_column, "start_column", -_MOST_COLUMN, _MOST_COLUMN)
+        if terrain is not None:
+            terrain = _terrain(terrain)
+            if start_row is None or start_column is None:
+                raise Error("start_column, start_row: expected with terrain")
+        self._world = _morphcog.WorldData(body, start_column, start_row, _config(config), terrain)
         self._turn = _threading.RLock()
         self._seen(_np.zeros(body.shape))
 
@@ -423,8 +433,21 @@ class World:
             self._world.set_stimulus(pixels)
             self._seen(pixels)
 
+    def set_targets(self, targets):
+        """Sets the length that each actuator aims at from the next control step on, in voxel lengths (EvoGym's
+        action): float64 (actuators,), row-major, clipped to 0.6 to 1.6. Actuators are voxels of material 7 and 8."""
+        targets = _array(targets, _np.float64, 1, "targets", "a length for each actuator")
+        with self._turn:
+            self._world.set_targets(targets)
+
     def step(self, count=1):
-        """Simulates control steps. Raises Unstable if the simulation ends in one of them."""
+        """Simulates control steps: a number of them, or one with new targets, as step(actions) of EvoGym. Raises
+        Unstable if the simulation ends in one of them."""
+        if _np.ndim(count):
+            with self._turn:
+                self.set_targets(count)
+                self._world.step(1)
+            return
         count = _whole(count, "count", 0)
         with self._turn:
             self._world.step(count)
@@ -442,9 +465,17 @@ class World:
 
     @property
     def points(self):
-        """Corners of all voxels: float64 (points, 2), voxel lengths from the start's left edge and the ground."""
+        """Corners of all voxels: float64 (points, 2), voxel lengths from the start's left edge and the ground; on
+        terrain from column 0 and row 0."""
         with self._turn:
             return self._world.points
+
+    @property
+    def velocities(self):
+        """Velocities of the points: float64 (points, 2), voxel lengths per second of simulated time (a control step
+        has 3 ms of it)."""
+        with self._turn:
+            return self._world.velocities
 
     @property
     def voxels(self):
@@ -861,18 +892,25 @@ def _members(about):
     return _pandas().DataFrame(rows, columns=[*columns, "accuracy"])
 
 
-def from_evogym(structure, *, driven=False):
-    """A body from EvoGym's numbers of voxels (0 empty, 1 rigid, 2 soft, 3 horizontal actuator).
+def from_evogym(structure, *, driven=None):
+    """A body from EvoGym's numbers of voxels (0 empty, 1 rigid, 2 soft, 3 horizontal and 4 vertical actuator).
 
-    Actuators become muscles in phase, which oscillate by themselves. With driven=True they become expanding
-    sensors, whose pixel is EvoGym's action less 0.6: a controller sets World.stimulus at every step. Raises
-    Error for 4, the vertical actuator, which morphcog's physics does not have.
+    driven="targets" makes actuators (7 and 8), whose lengths World.step(actions) sets, as in EvoGym; a structure with
+    vertical actuators has them without asking. Otherwise horizontal actuators become muscles in phase, which oscillate
+    by themselves, or, with driven=True, expanding sensors, whose pixel is EvoGym's action less 0.6: a controller sets
+    World.stimulus at every step.
     """
-    structure = _array(structure, _np.uint8, 2, "structure", "EvoGym's voxels 0 to 3 of shape (rows, columns)")
-    if (structure == 4).any():
-        raise Error("structure: 4 is EvoGym's vertical actuator, which morphcog does not have: voxels change in width only")
+    structure = _array(structure, _np.uint8, 2, "structure", "EvoGym's voxels 0 to 4 of shape (rows, columns)")
     if (structure > 4).any():
-        raise Error(f"structure: expected EvoGym's voxels 0 to 3, found {structure.max()}")
+        raise Error(f"structure: expected EvoGym's voxels 0 to 4, found {structure.max()}")
+    vertical = (structure == 4).any()
+    if driven is None:
+        driven = "targets" if vertical else False
+    if driven not in (True, False, "targets"):
+        raise Error(f'driven={driven!r}: expected True, False or "targets"')
+    if vertical and driven != "targets":
+        raise Error(f'driven={driven!r}: 4 is EvoGym\'s vertical actuator, which only World.step(actions) drives: expected driven="targets"')
     body = structure.copy()
-    body[structure == 3] = 6 if driven else 3
+    body[structure == 3] = {True: 6, False: 3, "targets": 7}[driven]
+    body[structure == 4] = 8
     return body

@@ -12,6 +12,9 @@ from . import _morphcog
 from ._morphcog import Error
 
 
+_MOST_COLUMN = 10**6
+
+
 def _given(value, what, expected):
     try:
         return _np.asarray(value)
@@ -51,7 +54,28 @@ def _threads(value):
 
 
 def _body(value, what="body"):
-    return _array(value, _np.uint8, 2, what, "materials 0 to 6 of shape (rows, columns)")
+    return _array(value, _np.uint8, 2, what, "materials 0 to 8 of shape (rows, columns)")
+
+
+def _terrain(value):
+    """Objects of fixed cells: their column, row, and rows of the grid as text."""
+    keys, objects = {"column", "row", "grid"}, []
+    if isinstance(value, (str, bytes, _Mapping)):
+        raise Error("terrain: expected a list of objects, each a dict of column, row and grid")
+    for number, given in enumerate(value):
+        what = f"terrain[{number}]"
+        if not isinstance(given, _Mapping) or set(given) != keys:
+            raise Error(f"{what}: expected a dict of column, row and grid")
+        grid = given["grid"]
+        if not all(isinstance(row, str) for row in grid):
+            rows = _array(grid, _np.uint8, 2, f"{what}.grid", "rows of 0 (empty) and 5 (fixed)")
+            grid = ["".join(map(str, row)) for row in rows]
+        column = _whole(given["column"], f"{what}.column", 0, _MOST_COLUMN)
+        row = _whole(given["row"], f"{what}.row", 0, _morphcog.MAX_ROW)
+        if column is None or row is None:
+            raise Error(f"{what}: expected whole numbers as column and row")
+        objects.append((column, row, list(grid)))
+    return objects
 
 
 def _stimuli(value):

@@ -2,14 +2,15 @@
 
 use crate::arrays::{body, seen};
 use crate::config::{ConfigData, setting};
-use crate::errors::{Unstable, entered, refused};
+use crate::errors::{Unstable, entered, raised, refused};
 use crate::pictures::RecordingData;
 use crate::watch::check_interrupt;
 use morphcog::body::Body;
 use morphcog::sim::{FloatEnvironment, Start, System};
 use morphcog::task::protocol::MAX_ROW;
-use morphcog::task::rollout::{moment, place};
-use numpy::{PyArray2, PyReadonlyArray2};
+use morphcog::task::rollout::{moment, place_from};
+use morphcog::task::terrain::{FixedObject, built, placed};
+use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -28,35 +29,65 @@ pub(crate) struct WorldData {
 struct Simulation {
     world: morphcog::sim::World,
     unstable: Option<String>,
+    /// Where positions count from \[voxel lengths\].
+    origin: [f64; 2],
 }
 
 #[pymethods]
 impl WorldData {
     #[new]
-    #[pyo3(signature = (voxels, start_row, config))]
+    #[pyo3(signature = (voxels, start_column, start_row, config, terrain))]
     fn new(
         voxels: PyReadonlyArray2<u8>,
+        start_column: Option<i64>,
         start_row: Option<u32>,
         config: Option<&ConfigData>,
+        terrain: Option<Vec<(u32, u32, Vec<String>)>>,
     ) -> PyResult<Self> {
         let _environment = entered()?;
         let body = body(&voxels, "body")?;
         let (physics, protocol) = setting(config);
-        let (lowest, row) = (physics.ground_row, start_row.unwrap_or(protocol.start_row));
-        if !(lowest..=MAX_ROW).contains(&row) {
+        let start = Start {
+            column: start_column.unwrap_or(protocol.start_column),
+            row: start_row.unwrap_or(protocol.start_row),
+        };
+        let lowest = match terrain {
+            None => physics.ground_row,
+            Some(_) => 0,
+        };
+        if !(lowest..=MAX_ROW).contains(&start.row) {
+            let on_ground = if terrain.is_none() {
+                " (on the ground)"
+            } else {
+                ""
+            };
             return Err(refused(format!(
-                "start_row={row}: expected {lowest} (on the ground) to {MAX_ROW}"
+                "start_row={}: expected {lowest}{on_ground} to {MAX_ROW}",
+                start.row
             )));
         }
-        let start = Start {
-            column: protocol.start_column,
-            row,
+        let origin = match terrain {
+            None => [0.0, -f64::from(physics.ground_row)],
+            Some(_) => [start.column as f64, 0.0],
         };
-        let world = morphcog::sim::World::new(System::new(&body, physics), start);
+        let system = System::new(&body, physics);
+        let world = match terrain {
+            None => morphcog::sim::World::new(system, start),
+            Some(objects) => {
+                let objects = objects.into_iter();
+                let objects: Vec<FixedObject> = objects
+                    .map(|(column, row, grid)| FixedObject { column, row, grid })
+                    .collect();
+                built(&objects, system.physics().cell_size)
+                    .and_then(|terrain| placed(system, start, terrain))
+                    .map_err(|error| raised(&error))?
+            }
+        };
         Ok(WorldData {
             simulation: Mutex::new(Simulation {
                 world,
                 unstable: None,
+                origin,
             }),
             body,
         })
@@ -75,7 +106,8 @@ impl WorldData {
         let _environment = entered()?;
         let stimulus = seen(pixels.as_array(), &self.body)?;
         let simulation = self.simulation(py);
-        let recording = moment(&simulation.world, &self.body, stimulus);
+        let world = &simulation.world;
+        let recording = moment(world, &self.body, stimulus, simulation.origin);
         Ok(RecordingData::new(recording))
     }
 
@@ -84,6 +116,14 @@ impl WorldData {
         let pixels = seen(pixels.as_array(), &self.body)?;
         self.simulation(py).world.set_stimulus(&pixels);
         Ok(())
+    }
+
+    /// Sets the length of every actuator \[voxel lengths\], instead of a stimulus.
+    fn set_targets(&self, py: Python, targets: PyReadonlyArray1<f64>) -> PyResult<()> {
+        let _environment = entered()?;
+        let targets: Vec<f64> = targets.as_array().iter().copied().collect();
+        let set = self.simulation(py).world.set_targets(&targets);
+        set.map_err(|error| refused(format!("targets: {error}")))
     }
 
     fn step(&self, py: Python, count: u64) -> PyResult<()> {
@@ -126,13 +166,21 @@ impl WorldData {
     fn points<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         let _environment = FloatEnvironment::standard();
         let simulation = self.simulation(py);
-        let places: Vec<f64> = simulation
-            .world
-            .points()
-            .flat_map(|place| simulation.lengths(place))
-            .collect();
-        let array = numpy::ndarray::Array2::from_shape_vec((places.len() / 2, 2), places);
-        PyArray2::from_owned_array(py, array.expect("two coordinates a point"))
+        let places = simulation.world.points();
+        pairs(py, places.flat_map(|place| simulation.lengths(place)))
+    }
+
+    /// Returns the velocities of the points \[voxel lengths / s\].
+    #[getter]
+    fn velocities<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let _environment = FloatEnvironment::standard();
+        let simulation = self.simulation(py);
+        let cell = simulation.world.system().physics().cell_size;
+        let velocities = simulation.world.velocities();
+        pairs(
+            py,
+            velocities.flat_map(|velocity| velocity.map(|v| v / cell)),
+        )
     }
 
     /// Returns the corners of each voxel as indices of points, clockwise from the top left.
@@ -147,6 +195,13 @@ impl WorldData {
         let array = numpy::ndarray::Array2::from_shape_vec((corners.len() / 4, 4), corners);
         PyArray2::from_owned_array(py, array.expect("four corners a voxel"))
     }
+}
+
+/// Returns an array with two coordinates a row.
+fn pairs<'py>(py: Python<'py>, numbers: impl Iterator<Item = f64>) -> Bound<'py, PyArray2<f64>> {
+    let numbers: Vec<f64> = numbers.collect();
+    let array = numpy::ndarray::Array2::from_shape_vec((numbers.len() / 2, 2), numbers);
+    PyArray2::from_owned_array(py, array.expect("two coordinates a point"))
 }
 
 impl WorldData {
@@ -177,8 +232,8 @@ impl Simulation {
         stepped
     }
 
-    /// Converts a position to voxel lengths, with y from the ground.
+    /// Converts a position to voxel lengths from the origin.
     fn lengths(&self, at: [f64; 2]) -> [f64; 2] {
-        place(at, self.world.system().physics())
+        place_from(at, self.world.system().physics(), self.origin)
     }
 }

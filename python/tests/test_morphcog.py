@@ -3,6 +3,7 @@
 import copy
 import ctypes
 import ctypes.util
+import gzip
 import io
 import json
 import os
@@ -21,6 +22,7 @@ import numpy as np
 import pytest
 
 WALKER = np.array([[4, 4, 4, 4, 2, 2], [4, 4, 4, 4, 2, 2], [3, 3, 3, 3, 1, 1], [3, 3, 0, 0, 1, 1]], dtype=np.uint8)
+FLOOR = [{"column": 0, "row": 0, "grid": ["555"]}]
 SENSOR = np.array([[3, 3, 6], [4, 4, 6]], dtype=np.uint8)
 
 
@@ -104,10 +106,42 @@ def test_a_controller_can_drive_every_sensor_at_every_step():
     assert widths == sorted(widths) and widths[2] == pytest.approx(1, abs=1e-3) and widths[4] - widths[0] > 0.4
 
 
+@pytest.mark.parametrize("name", ["climber0_2", "obstacletraverser1_2"])
+def test_a_world_on_terrain_takes_evogyms_actions_and_follows_its_trajectory(name, tmp_path):
+    golden = pathlib.Path(__file__).parents[2] / "crates/sim/tests/golden/terrain" / f"{name}.json.gz"
+    run = json.loads(gzip.decompress(golden.read_bytes()))
+    structure = np.array([[int(voxel) for voxel in row] for row in run["body"]])
+    body = mc.from_evogym(structure)
+    assert np.array_equal(body, np.where(structure >= 3, structure + 4, structure))
+    terrain = [{key: item[key] for key in ("column", "row", "grid")} for item in run["terrain_objects"]]
+    world = mc.World(body, terrain=terrain, start_column=run["start_column"], start_row=run["start_row"])
+    phases = run["phase"] * np.arange((body >= 7).sum())
+    com, before = [world.centre], world.points
+    for step in range(len(run["com"]) - 1):
+        world.step(1.1 + 0.5 * np.sin(2 * np.pi * step / 25 + phases))
+        com.append(world.centre)
+    assert np.abs(np.array(com) - run["com"]).max() < 1e-6
+    assert world.velocities.shape == before.shape and np.abs(world.velocities).max() > 0
+    assert world.render().save(tmp_path / "now.png").read_bytes().startswith(b"\x89PNG")
+    # A grid of numbers is the same as text.
+    numbers = [{**item, "grid": [[int(cell) for cell in row] for row in item["grid"]]} for item in terrain]
+    again = mc.World(body, terrain=numbers, start_column=run["start_column"], start_row=run["start_row"])
+    assert np.array_equal(again.points, before)
+
+
+def test_velocities_are_those_of_the_points():
+    world = mc.World([[3, 3], [4, 4]], start_row=9)
+    world.step()
+    y = world.points[:, 1]
+    world.step()
+    # Falls freely but for its muscles: 3 ms a control step.
+    assert np.mean(world.points[:, 1] - y) / 0.003 == pytest.approx(world.velocities[:, 1].mean(), rel=0.5)
+
+
 @pytest.mark.parametrize(
     "call, words",
     [
-        (lambda: mc.displacements([[[7]]], np.zeros((1, 1, 1))), ["body 0: 7 is not a material"]),
+        (lambda: mc.displacements([[[9]]], np.zeros((1, 1, 1))), ["body 0: 9 is not a material"]),
         (lambda: mc.displacements([[[1, 0, 1]]], np.zeros((1, 1, 3))), ["hang together"]),
         (lambda: mc.rollouts([SENSOR] * 3 + [SENSOR * 0], np.zeros((1, 2, 3))), ["body 3: expected at least one"]),
         (lambda: mc.rollouts([SENSOR], np.zeros((1, 2, 3)), every=0), ["every=0"]),
@@ -127,7 +161,7 @@ def test_a_controller_can_drive_every_sensor_at_every_step():
         (lambda: mc.displacements([[1, 2]], np.zeros((1, 1, 2))), ["body 0", "shape (2,)"]),
         (lambda: mc.displacements([[[1.0]]], np.zeros((1, 1, 1))), ["float64"]),
         (lambda: mc.displacements([[[-1]]], np.zeros((1, 1, 1))), ["-1"]),
-        (lambda: mc.displacements([[[True]]], np.zeros((1, 1, 1))), ["materials 0 to 6", "bool"]),
+        (lambda: mc.displacements([[[True]]], np.zeros((1, 1, 1))), ["materials 0 to 8", "bool"]),
         (lambda: mc.displacements([SENSOR], np.zeros((2, 2))), ["shape (2, 2)", "(images, rows, columns)"]),
         (lambda: mc.displacements([SENSOR], np.zeros((1, 3, 3))), ["2 × 3 pixels", "3 × 3"]),
         (lambda: mc.displacements([SENSOR], np.full((1, 2, 3), 255.0)), ["from 0 to 1", "255"]),
@@ -142,8 +176,16 @@ def test_a_controller_can_drive_every_sensor_at_every_step():
         (lambda: mc.displacements([SENSOR], np.zeros((1, 2, 3)), threads=0), ["threads=0", "from 1 to 1024"]),
         (lambda: mc.stimuli(np.zeros((1, 0, 28), np.uint8), "zero_one.toml"), ["0 x 28 pixels"]),
         (lambda: mc.evolve("quickstart.toml", resume=True, force=True), ["resume", "force"]),
-        (lambda: mc.from_evogym([[4, 3]]), ["vertical actuator"]),
-        (lambda: mc.from_evogym([[5]]), ["0 to 3"]),
+        (lambda: mc.from_evogym([[4, 3]], driven=True), ["vertical actuator", 'driven="targets"']),
+        (lambda: mc.from_evogym([[3]], driven="often"), ["driven='often'"]),
+        (lambda: mc.from_evogym([[5]]), ["0 to 4"]),
+        (lambda: mc.World([[7, 8]]).set_targets([1.0]), ["targets", "expected 2"]),
+        (lambda: mc.World([[7]]).step([np.nan]), ["targets", "not a number"]),
+        (lambda: mc.World([[7]], terrain=FLOOR), ["start_column", "start_row"]),
+        (lambda: mc.World([[7]], terrain=FLOOR, start_column=0, start_row=0), ["overlaps"]),
+        (lambda: mc.World([[7]], terrain=FLOOR[0], start_column=0, start_row=1), ["terrain", "list of objects"]),
+        (lambda: mc.World([[7]], terrain=[{"grid": []}], start_column=0, start_row=1), ["terrain[0]", "column"]),
+        (lambda: mc.World([[7]], terrain=[{**FLOOR[0], "grid": ["56"]}], start_column=0, start_row=1), ["grid[0]"]),
         (lambda: mc.stimuli(np.zeros((1, 28, 28)), "zero_one.toml"), ["whole numbers", "float64", "(255 * images)"]),
         (lambda: mc.stimuli(np.full((1, 28, 28), 256), "zero_one.toml"), ["0 to 255", "256"]),
         (lambda: mc.stimuli(np.zeros((2**58, 28, 0), np.uint8), "zero_one.toml"), ["28 x 0 pixels"]),

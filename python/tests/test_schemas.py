@@ -87,7 +87,7 @@ def test_a_schema_is_one_and_has_a_name_a_version_and_a_description_of_every_key
 
 
 def test_there_is_a_schema_of_everything_that_is_read_and_written():
-    assert {"config", "sweep", "plan", "run", "eval", "audit", "response", "team", "capacity"} <= set(NAMES)
+    assert {"config", "sweep", "plan", "run", "eval", "audit", "response", "team", "capacity", "scenario"} <= set(NAMES)
 
 
 def test_shipped_configs_are_valid_as_they_are_and_with_all_their_keys():
@@ -120,6 +120,28 @@ def test_what_the_program_refuses_in_a_config_is_invalid(tmp_path, section, key,
     assert wrong(schema, config) != []
     (tmp_path / "bad.json").write_text(json.dumps(config))
     assert morphcog(tmp_path, "evolve", "-c", "bad.json", "-o", "bad").returncode in (2, 3)
+
+
+def test_what_the_program_refuses_in_a_scenario_is_invalid(tmp_path):
+    schema = validator("scenario")
+    ground = {"column": 0, "row": 0, "grid": ["555"]}
+    scenario = {"body": [[7, 8]], "terrain": [ground], "start_column": 0, "start_row": 1, "control_steps": 2}
+    scenario["targets"] = {"mean": 1, "amplitude": 0.5, "period": 25, "phases": [0, 1]}
+    (tmp_path / "good.json").write_text(json.dumps(scenario))
+    assert wrong(schema, scenario) == [] and morphcog(tmp_path, "simulate", "good.json").returncode == 0
+    assert wrong(schema, {**scenario, "targets": [[1, 1.2]]}) == []
+    for key, value in [
+        ("body", [[9]]),
+        ("terrain", [{**ground, "colour": "red"}]),
+        ("terrain", [{**ground, "column": -1}]),
+        ("targets", {"mean": 1}),
+        ("targets", 7),
+        ("start", 1),
+    ]:
+        other = {**scenario, key: value}
+        assert wrong(schema, other) != [], f"{key}: {value}"
+        (tmp_path / "bad.json").write_text(json.dumps(other))
+        assert morphcog(tmp_path, "simulate", "bad.json").returncode == 3, f"{key}: {value}"
 
 
 def test_written_results_are_valid_and_those_of_another_format_are_not(tmp_path):

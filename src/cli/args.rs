@@ -173,10 +173,11 @@ Examples:
     /// Make a figure: SVG, PNG and PDF for papers and pages.
     #[command(after_help = plot::EXAMPLES)]
     Plot(PlotArgs),
-    /// Simulate any body with any stimuli.
+    /// Simulate any body with any stimuli or targets, on any terrain.
     #[command(after_help = "\
 Examples:
   morphcog simulate scenario.json --out traj.csv
+  morphcog simulate scenario.json --out walk.gif
   jq '.control_steps = 50' scenario.json |
     morphcog simulate - --points > points.csv
 
@@ -187,11 +188,16 @@ scenario.json:
    \"start_column\": 493, \"reset_between\": false}
 
 body: rows from the top; 0 empty, 1 rigid, 2 soft, 3 and 4 muscle (in phase, antiphase), 5 and 6 \
-sensor (shrinks, expands). stimulus: one pixel per voxel, 0 to 1; or \"stimuli\": [...] with \
-\"switch_every\": 500.
+sensor (shrinks, expands), 7 and 8 actuator (horizontal, vertical). stimulus: one pixel per voxel, 0 to 1; or \
+\"stimuli\": [...] with \"switch_every\": 500; and targets of actuators, in voxel lengths:
+  \"targets\": {\"mean\": 1.1, \"amplitude\": 0.5,
+    \"period\": 25, \"phases\": [0, 1.7, 3.4, 5.1]}
+or a list for each control step. Fixed cells (5) instead of the flat ground:
+  \"terrain\": [{\"column\": 0, \"row\": 0,
+    \"grid\": [\"0000000055\", \"5555555555\"]}]
 
-Output: step,com_x,com_y in voxel lengths, x from the body's left edge at the start, y from the ground; with \
---points also x_0,y_0,… and pixel_0_0,…. \
+Output: step,com_x,com_y in voxel lengths, x from the body's left edge at the start, y from the ground (on \
+terrain from column 0 and row 0); with --points also x_0,y_0,… and pixel_0_0,…, target_0_0,…. \
 Exit code 4 if the rollout becomes unstable.")]
     Simulate(SimulateArgs),
     /// Draw a digit and watch robots walk, in the browser.
@@ -420,12 +426,16 @@ pub(super) struct ReplayArgs {
 pub(super) struct SimulateArgs {
     /// The scenario (JSON); - reads it from standard input.
     pub(super) scenario: PathBuf,
-    /// CSV file (default: standard output).
+    /// CSV file (default: standard output), or, by its ending, a picture or film (.gif, .html, .png,
+    /// .mp4, .webm; a folder, such as frames/, takes a film's frames).
     #[arg(short, long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
-    /// Write every point and every pixel as well.
+    /// Write every point, pixel and target as well.
     #[arg(long)]
     pub(super) points: bool,
+    /// Width of pictures in pixels (default: 480, films 1280).
+    #[arg(long, value_parser = whole::<u32>(0..=MOST))]
+    pub(super) width: Option<u32>,
 }
 
 #[derive(Debug, Subcommand)]

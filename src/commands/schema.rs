@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::commands::plan::PaperPlan;
+use crate::commands::simulate::Scenario;
 use crate::commands::sweep::SweepPlan;
 use crate::config::Config;
 use crate::config::audit::Criteria;
@@ -31,12 +32,13 @@ pub struct Schema {
 }
 
 /// All schemas.
-pub const ALL: [Schema; 11] = [
+pub const ALL: [Schema; 12] = [
     of_config::<Config>("config", "config of evolve and train"),
     of_config::<SweepPlan>("sweep", "plan of sweep"),
     of_config::<PaperPlan>("plan", "plan of reproduce"),
     of_config::<Criteria>("audit-config", "config of audit"),
     of_config::<CapacityConfig>("capacity-config", "config of capacity"),
+    of_config::<Scenario>("scenario", "scenario of simulate"),
     of::<RunFile>("run", "run.json", run::FORMAT_VERSION),
     of::<EvalFile>("eval", "eval.json", eval::FORMAT_VERSION),
     of::<AuditFile>("audit", "audit.json", audit::FORMAT_VERSION),

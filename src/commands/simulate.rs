@@ -1,40 +1,60 @@
-//! `morphcog simulate`: simulates any body under any stimuli.
+//! `morphcog simulate`: simulates any body under any stimuli and targets, on any terrain.
+
+mod targets;
 
 use crate::base::Grid;
 use crate::base::error::{Error, ErrorKind};
 use crate::base::files::{read_given, read_limited, write_whole};
 use crate::base::session::Session;
-use crate::body::Body;
+use crate::base::stop::NEVER;
+use crate::body::{Body, Material};
+use crate::commands::replay::Replay;
 use crate::config::reading;
-use crate::sim::{Physics, Start, System, World};
+use crate::sim::{Physics, Start, StepError, System, World};
 use crate::store::folder;
+use crate::task::class_names::ClassNames;
 use crate::task::protocol::{MAX_COLUMN, MAX_ROW, MAX_STEPS};
-use crate::task::rollout::place;
+use crate::task::recording::{Frame, LabelledStimulus, Phase, Recording};
+use crate::task::rollout::{MOST_PLACES, frame_from, place_from, voxels};
+use crate::task::terrain::{self, FixedObject, at_most_a_thousand};
+use schemars::JsonSchema;
 use serde::de::{Error as _, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 use std::fmt;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use targets::{Targets, TargetsForm};
 
-/// A body, its stimuli, and the length of the simulation.
-#[derive(Debug, Deserialize)]
+/// A body, its stimuli and targets, its ground, and the length of the simulation.
+#[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
-    /// The body as rows of 0…6.
+    /// The body as rows of 0…8.
     pub(crate) body: Body,
-    /// One stimulus for the whole simulation: H × W in [0, 1].
+    /// One stimulus for the whole simulation: a pixel per voxel, 0 to 1.
+    #[schemars(with = "Option<Vec<Vec<f64>>>")]
     stimulus: Option<Grid<f64>>,
-    /// Or several, each for `switch_every` control steps; after the last, the first follows.
+    /// Several stimuli, each for `switch_every` control steps; after the last, the first follows.
     #[serde(default, deserialize_with = "bounded")]
+    #[schemars(with = "Option<Vec<Vec<Vec<f64>>>>")]
     stimuli: Option<Vec<Grid<f64>>>,
+    /// Number of control steps of each stimulus.
     switch_every: Option<u64>,
     /// True if the robot returns to its initial state at every switch.
     #[serde(default)]
     reset_between: bool,
-    /// Grid column of the body's left edge.
-    #[serde(default = "paper_column")]
-    start_column: i64,
-    /// Grid row of its bottom row; 2 is on the ground.
+    /// The length of each actuator at every control step; without targets, they rest.
+    #[schemars(with = "Option<TargetsForm>")]
+    targets: Option<Targets>,
+    /// Objects of fixed cells on which the body starts, instead of the flat ground.
+    #[serde(default, deserialize_with = "some_objects")]
+    #[schemars(with = "Option<Vec<FixedObject>>")]
+    terrain: Option<Vec<FixedObject>>,
+    /// Grid column of the body's left edge; 493 if it is not given, needed with terrain.
+    start_column: Option<i64>,
+    /// Grid row of its bottom row: 2 is on the flat ground; needed with terrain, whose rows count
+    /// from 0.
     start_row: Option<u32>,
     /// Number of control steps.
     control_steps: Option<u64>,
@@ -93,9 +113,14 @@ fn bounded<'de, D: Deserializer<'de>>(reader: D) -> Result<Option<Vec<Grid<f64>>
     reader.deserialize_option(Perhaps)
 }
 
-fn paper_column() -> i64 {
-    493
+fn some_objects<'de, D: Deserializer<'de>>(
+    reader: D,
+) -> Result<Option<Vec<FixedObject>>, D::Error> {
+    at_most_a_thousand(reader).map(Some)
 }
+
+/// The paper's start column.
+const COLUMN: i64 = 493;
 
 /// Default number of control steps: ten actuation cycles.
 const CONTROL_STEPS: u64 = 500;
@@ -174,13 +199,30 @@ impl Scenario {
                 ));
             }
         }
-        let ground = self.physics.ground_row;
+        if let Some(targets) = &self.targets {
+            targets
+                .validate(self.actuators().count())
+                .map_err(Error::input)?;
+        }
+        let is_flat = self.terrain.is_none();
+        if !is_flat {
+            for (key, is_missing) in [
+                ("start_column", self.start_column.is_none()),
+                ("start_row", self.start_row.is_none()),
+            ] {
+                if is_missing {
+                    return refuse(format!("{key}: expected with terrain"));
+                }
+            }
+        }
+        let ground = if is_flat { self.physics.ground_row } else { 0 };
         if let Some(row) = self
             .start_row
             .filter(|row| !(ground..=MAX_ROW).contains(row))
         {
+            let on_ground = if is_flat { " (on the ground)" } else { "" };
             return refuse(format!(
-                "start_row: {row}, expected {ground} (on the ground) to {MAX_ROW}"
+                "start_row: {row}, expected {ground}{on_ground} to {MAX_ROW}"
             ));
         }
         if self.control_steps() > u64::from(MAX_STEPS) {
@@ -194,12 +236,45 @@ impl Scenario {
                 "{key}: {steps} control steps in all, expected at most {MAX_STEPS}"
             ));
         }
-        if !(-MAX_COLUMN..=MAX_COLUMN).contains(&self.start_column) {
+        if !(-MAX_COLUMN..=MAX_COLUMN).contains(&self.start().column) {
             return refuse(format!(
                 "start_column: expected −{MAX_COLUMN} to {MAX_COLUMN}"
             ));
         }
+        // Refuses a wrong terrain, and a body without room on it.
+        if !is_flat {
+            self.world()?;
+        }
         Ok(())
+    }
+
+    /// Makes the robot at rest at its start.
+    fn world(&self) -> Result<World, Error> {
+        let system = System::new(&self.body, self.physics.clone());
+        match &self.terrain {
+            None => Ok(World::new(system, self.start())),
+            Some(objects) => {
+                let terrain = terrain::built(objects, self.physics.cell_size)?;
+                terrain::placed(system, self.start(), terrain)
+            }
+        }
+    }
+
+    /// Returns where positions count from \[voxel lengths\]: the body's left edge and the ground, or
+    /// on terrain column 0 and row 0.
+    fn origin(&self) -> [f64; 2] {
+        match self.terrain {
+            None => [0.0, -f64::from(self.physics.ground_row)],
+            Some(_) => [self.start().column as f64, 0.0],
+        }
+    }
+
+    /// Returns the row and column of each actuator, row-major.
+    fn actuators(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let voxels = self.body.voxels().iter();
+        voxels
+            .filter(|(_, material): &(_, &Material)| material.is_actuator())
+            .map(|(place, _)| place)
     }
 
     /// Returns the stimuli in turn, none if all is dark.
@@ -209,7 +284,7 @@ impl Scenario {
 
     pub(crate) fn start(&self) -> Start {
         Start {
-            column: self.start_column,
+            column: self.start_column.unwrap_or(COLUMN),
             row: self.start_row.unwrap_or(self.physics.ground_row),
         }
     }
@@ -222,14 +297,105 @@ impl Scenario {
         let shown = self
             .switch_every
             .map(|every| every.saturating_mul(self.stimuli().len() as u64));
-        self.control_steps.or(shown).unwrap_or(CONTROL_STEPS)
+        let listed = self.targets.as_ref().and_then(Targets::listed);
+        let given = self.control_steps.or(shown).or(listed);
+        given.unwrap_or(CONTROL_STEPS)
+    }
+
+    /// Refuses what only the simulator has: other ground than the flat one, and targets.
+    pub(crate) fn check_plain(&self) -> Result<(), String> {
+        let key = match (&self.terrain, &self.targets) {
+            (Some(_), _) => "terrain",
+            (None, Some(_)) => "targets",
+            (None, None) => return Ok(()),
+        };
+        Err(format!(
+            "scenario: {key}: the page has the flat ground and stimuli only; morphcog simulate takes others"
+        ))
+    }
+}
+
+/// A scenario under way.
+struct Simulation<'a> {
+    scenario: &'a Scenario,
+    world: World,
+    step: u64,
+    dark: Grid<f64>,
+    targets: Vec<f64>,
+}
+
+impl<'a> Simulation<'a> {
+    fn new(scenario: &'a Scenario) -> Result<Self, Error> {
+        Ok(Simulation {
+            world: scenario.world()?,
+            step: 0,
+            dark: Grid::filled(scenario.body.height(), scenario.body.width(), 0.0),
+            targets: vec![1.0; scenario.actuators().count()],
+            scenario,
+        })
+    }
+
+    /// Returns the number of a stimulus in the next or the present control step.
+    fn stimulus(&self, step: u64) -> Option<usize> {
+        let every = self.scenario.switch_every.unwrap_or(u64::MAX);
+        let count = self.scenario.stimuli().len() as u64;
+        Some(((step / every).checked_rem(count))? as usize)
+    }
+
+    /// Returns the stimulus of the control step before; dark at the start.
+    fn shown(&self) -> &Grid<f64> {
+        let before = self.step.checked_sub(1);
+        let number = before.and_then(|step| self.stimulus(step));
+        number.map_or(&self.dark, |number| &self.scenario.stimuli()[number])
+    }
+
+    /// Returns true if a stimulus begins with the next control step.
+    fn switches(&self) -> bool {
+        let every = self.scenario.switch_every.unwrap_or(u64::MAX);
+        self.step.is_multiple_of(every) && !self.scenario.stimuli().is_empty()
+    }
+
+    /// Simulates the next control step, under its stimulus or targets.
+    fn step(&mut self, stop: &AtomicBool) -> Result<(), Error> {
+        if self.switches()
+            && let Some(number) = self.stimulus(self.step)
+        {
+            self.world.set_stimulus(&self.scenario.stimuli()[number]);
+            if self.scenario.reset_between {
+                self.world.reset();
+            }
+        }
+        if let Some(targets) = &self.scenario.targets {
+            targets.at(self.step, &mut self.targets);
+            let set = self.world.set_targets(&self.targets);
+            set.map_err(|error| Error::input(format!("targets: {error}")))?;
+        }
+        StepError::outcome(self.world.step_unless(stop))?.map_err(|unstable| {
+            // Resets restart the simulation's own clock; errors count the scenario's steps.
+            let unstable = crate::sim::Unstable {
+                control_step: self.step,
+                ..unstable
+            };
+            Error::unstable(unstable.to_string())
+        })?;
+        self.step += 1;
+        Ok(())
+    }
+
+    fn lengths(&self, at: [f64; 2]) -> [f64; 2] {
+        place_from(at, &self.scenario.physics, self.scenario.origin())
+    }
+
+    fn frame(&self) -> Frame {
+        frame_from(&self.world, self.scenario.origin())
     }
 }
 
 /// Simulates the scenario and passes the CSV to `line`, line by line: `step,com_x,com_y`, then the
 /// centre of mass before the first and after every control step. `points` adds every point
-/// (`x_0,y_0`, …, in EvoGym's order) and pixel (`pixel_ROW_COLUMN`) of that step. Positions are in
-/// voxel lengths: x from the body's left edge at the start, y from the ground.
+/// (`x_0,y_0`, …, in EvoGym's order), pixel (`pixel_ROW_COLUMN`) and actuator's target
+/// (`target_ROW_COLUMN`) of that step. Positions are in voxel lengths: x from the body's left edge at the start, y from
+/// the ground; on terrain x from column 0, y from row 0.
 ///
 /// # Errors
 /// Returns [`crate::base::error::ErrorKind::Unstable`] if it ends early, or the error of `line`.
@@ -238,57 +404,141 @@ pub fn simulate(
     points: bool,
     mut line: impl FnMut(String) -> Result<(), Error>,
 ) -> Result<(), Error> {
-    let physics = &scenario.physics;
-    let start = scenario.start();
-    let mut world = World::new(System::new(&scenario.body, physics.clone()), start);
-    let lengths = |at: [f64; 2]| place(at, physics).map(digits17);
-    let stimuli = scenario.stimuli();
-    let dark = Grid::filled(scenario.body.height(), scenario.body.width(), 0.0);
+    let mut simulation = Simulation::new(scenario)?;
     let mut header = "step,com_x,com_y".to_string();
     if points {
-        (0..world.points().count()).for_each(|number| header += &format!(",x_{number},y_{number}"));
-        dark.iter()
-            .for_each(|((row, column), _)| header += &format!(",pixel_{row}_{column}"));
+        (0..simulation.world.points().count())
+            .for_each(|number| header += &format!(",x_{number},y_{number}"));
+        let pixels = simulation.dark.iter().map(|(place, _)| ("pixel", place));
+        let targets = scenario.actuators().map(|place| ("target", place));
+        pixels
+            .chain(targets)
+            .for_each(|(what, (row, column))| header += &format!(",{what}_{row}_{column}"));
     }
     line(header + "\n")?;
-    let mut row = |step: u64, world: &World, shown: &Grid<f64>| {
-        let [x, y] = lengths(world.centre_of_mass());
-        let mut text = format!("{step},{x},{y}");
+    let mut row = |simulation: &Simulation| {
+        let lengths = |at: [f64; 2]| simulation.lengths(at).map(digits17);
+        let [x, y] = lengths(simulation.world.centre_of_mass());
+        let mut text = format!("{},{x},{y}", simulation.step);
         if points {
-            world
-                .points()
-                .map(lengths)
-                .for_each(|[x, y]| text += &format!(",{x},{y}"));
-            shown
-                .cells()
-                .iter()
-                .for_each(|pixel| text += &format!(",{pixel}"));
+            let all = simulation.world.points().map(lengths);
+            all.for_each(|[x, y]| text += &format!(",{x},{y}"));
+            let inputs = simulation.shown().cells().iter().chain(&simulation.targets);
+            inputs.for_each(|input| text += &format!(",{input}"));
         }
         line(text + "\n")
     };
-    let mut shown = &dark;
-    row(0, &world, shown)?;
-    for step in 0..scenario.control_steps() {
-        let every = scenario.switch_every.unwrap_or(u64::MAX);
-        if step % every == 0 && !stimuli.is_empty() {
-            let index = (step / every) % stimuli.len() as u64;
-            shown = &stimuli[index as usize];
-            world.set_stimulus(shown);
-            if scenario.reset_between {
-                world.reset();
-            }
-        }
-        world.step().map_err(|unstable| {
-            // Resets restart the simulation's own clock; errors count the scenario's steps.
-            let unstable = crate::sim::Unstable {
-                control_step: step,
-                ..unstable
-            };
-            Error::unstable(unstable.to_string())
-        })?;
-        row(step + 1, &world, shown)?;
+    row(&simulation)?;
+    for _ in 0..scenario.control_steps() {
+        simulation.step(&NEVER)?;
+        row(&simulation)?;
     }
     Ok(())
+}
+
+/// Records the simulation for pictures, with a phase for each stimulus, under a name. An unstable
+/// simulation is recorded up to its end, and its error returned as well.
+///
+/// # Errors
+/// Returns an error if there would be too many frames, or `stop` was set.
+pub(crate) fn record(
+    scenario: &Scenario,
+    name: &str,
+    stop: &AtomicBool,
+) -> Result<(Replay, Result<(), Error>), Error> {
+    let mut simulation = Simulation::new(scenario)?;
+    let (steps, points) = (
+        scenario.control_steps(),
+        simulation.world.points().count() as u64,
+    );
+    let most = MOST_PLACES as u64 / points.max(1);
+    if steps > most {
+        return Err(Error::input(format!(
+            "control_steps: {steps} in all, expected at most {most} for pictures"
+        )));
+    }
+    let start = simulation.frame();
+    let mut recording = Recording {
+        robot: name.to_string(),
+        body: scenario.body.clone(),
+        terrain: simulation.world.terrain().cloned(),
+        voxels: voxels(&simulation.world),
+        phases: Vec::new(),
+        frames: vec![start.clone()],
+        every: 1,
+        cycle: scenario.physics.cycle_steps as usize,
+        unstable: false,
+        judge: None,
+        names: ClassNames::default(),
+    };
+    let mut outcome = Ok(());
+    for step in 0..steps.max(1) {
+        if step == 0 || simulation.switches() {
+            if step > 0 && scenario.reset_between {
+                recording.frames.push(start.clone());
+            }
+            recording
+                .phases
+                .push(phase(&simulation, recording.frames.len() - 1));
+        }
+        if step == steps {
+            break;
+        }
+        outcome = simulation.step(stop);
+        match &outcome {
+            Ok(()) => recording.frames.push(simulation.frame()),
+            Err(error) if error.kind == ErrorKind::Unstable => {
+                recording.unstable = true;
+                break;
+            }
+            Err(error) => return Err(error.clone()),
+        }
+    }
+    let ends: Vec<usize> = {
+        let next = recording.phases.iter().skip(1).map(|phase| {
+            let first = phase.first_frame;
+            first - usize::from(scenario.reset_between)
+        });
+        next.chain([recording.frames.len() - 1]).collect()
+    };
+    for (phase, end) in recording.phases.iter_mut().zip(ends) {
+        let x = |frame: usize| recording.frames[frame].centre[0];
+        phase.displacement = x(end) - x(phase.first_frame);
+    }
+    let about = vec![
+        ("Scenario".to_string(), name.to_string()),
+        ("Control steps".to_string(), steps.to_string()),
+    ];
+    let replay = Replay {
+        recording,
+        about,
+        name: name.to_string(),
+    };
+    Ok((replay, outcome))
+}
+
+/// Begins a phase with the next control step.
+fn phase(simulation: &Simulation, first_frame: usize) -> Phase {
+    let number = simulation.stimulus(simulation.step);
+    let stimuli = simulation.scenario.stimuli();
+    let label = match number {
+        None if simulation.scenario.targets.is_some() => "targets".to_string(),
+        None => "no stimulus".to_string(),
+        Some(_) if stimuli.len() == 1 => "stimulus".to_string(),
+        Some(number) => format!("stimulus {number}"),
+    };
+    Phase {
+        first_frame,
+        seen: LabelledStimulus {
+            class: 0,
+            label,
+            stimulus: number
+                .map_or(&simulation.dark, |number| &stimuli[number])
+                .clone(),
+            image: None,
+        },
+        displacement: 0.0,
+    }
 }
 
 /// Writes the CSV of a scenario to a file, which must not be the scenario's; that of an unstable

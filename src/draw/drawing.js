@@ -70,6 +70,27 @@ const Drawing = (() => {
     ctx.lineWidth = 1.5; ctx.beginPath(); ctx.moveTo(0, surface); ctx.lineTo(width, surface); ctx.stroke();
   };
 
+  // An object of fixed cells, where it is seen: its cells, the lines between them, and its outline.
+  const terrain = (ctx, { column, row, grid }, seen, { X, Y, scale }) => {
+    const isFixed = (x, y) => (grid[row + grid.length - 1 - y] || "")[x - column] === "5";
+    const within = (first, count, [low, high]) => [Math.max(first, Math.floor(low)), Math.min(first + count, Math.ceil(high))];
+    const [left, right] = within(column, grid[0].length, seen.columns), [low, high] = within(row, grid.length, seen.rows);
+    const lines = { sky: [], "ground-line": [] };
+    ctx.fillStyle = css("ground");
+    for (let y = low; y < high; y++) for (let x = left; x < right; x++) if (isFixed(x, y)) {
+      ctx.fillRect(X(x), Y(y + 1), X(x + 1) - X(x), Y(y) - Y(y + 1));
+      for (const [dx, dy, ...side] of [[0, 1, x, y + 1, x + 1, y + 1], [1, 0, x + 1, y + 1, x + 1, y], [0, -1, x, y, x + 1, y], [-1, 0, x, y + 1, x, y]]) {
+        lines[isFixed(x + dx, y + dy) ? "sky" : "ground-line"].push(side);
+      }
+    }
+    for (const [colour, sides] of Object.entries(lines)) {
+      if (colour === "sky" && scale < MARKED) continue;
+      ctx.strokeStyle = css(colour); ctx.lineWidth = colour === "sky" ? 1 : 1.5; ctx.beginPath();
+      for (const [a, b, c, d] of sides) { ctx.moveTo(X(a), Y(b)); ctx.lineTo(X(c), Y(d)); }
+      ctx.stroke();
+    }
+  };
+
   // A body: voxels [material, corners, …], its points (null where the simulation had lost one), and its sides.
   const robot = (ctx, { voxels, points, sides, areas, materials }, { X, Y, scale }) => {
     ctx.lineJoin = ctx.lineCap = "round";
@@ -123,11 +144,11 @@ const Drawing = (() => {
     return low > high ? (left + right) / 2 : Math.min(Math.max(middle, low), high);
   };
 
-  // Left, right and upper edge of some points; null are not known.
+  // Left, right, upper and lower edge of some points; null are not known.
   const extent = (points) => {
-    let left = Infinity, right = -Infinity, top = 0;
-    for (const q of points) if (q) { left = Math.min(left, q[0]); right = Math.max(right, q[0]); top = Math.max(top, q[1]); }
-    return left > right ? { left: 0, right: 0, top } : { left, right, top };
+    let left = Infinity, right = -Infinity, top = 0, bottom = Infinity;
+    for (const q of points) if (q) { left = Math.min(left, q[0]); right = Math.max(right, q[0]); top = Math.max(top, q[1]); bottom = Math.min(bottom, q[1]); }
+    return left > right ? { left: 0, right: 0, top, bottom: 0 } : { left, right, top, bottom };
   };
 
   // The way of the centre of mass, and where it is now.
@@ -211,5 +232,5 @@ const Drawing = (() => {
     return { name, a, side: (labels) => labels.map(name).join(labels.some((label) => given?.[label]) ? ", " : " ") };
   };
 
-  return { camera, classNames, css, element, extent, fit, frame, framed, sidesOf, ruler, robot, voxel, swatch, path, stimulus, Room };
+  return { camera, classNames, css, element, extent, fit, frame, framed, sidesOf, ruler, terrain, robot, voxel, swatch, path, stimulus, Room };
 })();

@@ -8,7 +8,9 @@ use crate::body::{Body, Material};
 use crate::draw::colour::{TONE_AREAS, mark, tones};
 use crate::draw::error::{PictureError, write_whole};
 use crate::draw::film;
+use crate::draw::panel::known;
 use crate::draw::walk::Walk;
+use crate::sim::TerrainObject;
 use crate::task::answer::THRESHOLD;
 use crate::task::class_names::ClassNames;
 use crate::task::recording::{Recording, VoxelCorners};
@@ -248,6 +250,7 @@ fn moments(walk: &Walk, every: usize, unit: f64) -> (Value, Vec<i16>) {
         words
     });
     let body = &recording.body;
+    let has_actuators = body.voxels().cells().iter().any(|m| m.is_actuator());
     let mut rollout = json!({
         "robot": recording.robot,
         "body": body.to_string(),
@@ -261,8 +264,19 @@ fn moments(walk: &Walk, every: usize, unit: f64) -> (Value, Vec<i16>) {
         "phases": phases.collect::<Vec<_>>(),
         "unit": unit,
         "origins": BASE64.encode(bytes(origins.iter().flatten().map(|v| v.to_le_bytes()))),
-        "materials": materials(),
+        "materials": if has_actuators { described(known()) } else { materials() },
     });
+    if let Some(terrain) = &recording.terrain {
+        let object = |object: &TerrainObject| {
+            let rows = object.cells.rows().map(|row| {
+                let cell = |fixed: &bool| if *fixed { '5' } else { '0' };
+                row.iter().map(cell).collect::<String>()
+            });
+            json!({ "column": object.column, "row": object.row, "grid": rows.collect::<Vec<_>>() })
+        };
+        let objects = terrain.objects().iter().map(object);
+        rollout["terrain"] = objects.collect::<Vec<_>>().into();
+    }
     named(&mut rollout, &recording.names);
     (rollout, positions)
 }
@@ -274,13 +288,18 @@ pub(crate) fn named(object: &mut Value, names: &ClassNames) {
     }
 }
 
-/// Describes the materials for the pages' scripts.
+/// Describes the materials that evolve for the pages' scripts.
 pub(crate) fn materials() -> Value {
+    described(Material::ALL.into_iter())
+}
+
+/// Describes materials for the pages' scripts, in the order of their numbers.
+fn described(materials: impl Iterator<Item = Material>) -> Value {
     let material = |m: Material| {
         let (name, tones, mark) = (m.name(), tones(m), mark(m));
         json!({ "name": name, "tones": tones, "mark": mark, "sensor": m.is_sensor(), "muscle": m.is_muscle() })
     };
-    json!({ "areas": TONE_AREAS, "list": Material::ALL.map(material) })
+    json!({ "areas": TONE_AREAS, "list": materials.map(material).collect::<Vec<_>>() })
 }
 
 /// Describes voxels for the pages' scripts: material, corners, row and column.

@@ -199,7 +199,8 @@ pub(crate) fn signed(distance: f64) -> String {
     text.replace('-', "−")
 }
 
-/// Draws the stimulus, its sensor voxels framed in their colour. Returns its width and height.
+/// Draws the stimulus, its sensor voxels framed in their colour. Returns its width and height; 0 if
+/// it drives nothing of a body with actuators.
 fn stimulus(
     walk: &Walk,
     frame: usize,
@@ -207,6 +208,11 @@ fn stimulus(
     z: f64,
     out: &mut Vec<Primitive>,
 ) -> [f64; 2] {
+    // A body that only targets drive sees nothing.
+    let has = |is: fn(Material) -> bool| present(&walk.recording().body).any(is);
+    if has(Material::is_actuator) && !has(Material::is_sensor) {
+        return [0.0; 2];
+    }
     let image = &walk.phase(frame).seen.stimulus;
     let longest = image.height().max(image.width()) as f64;
     let cell = (STIMULUS * z / longest).floor().max(1.0);
@@ -297,11 +303,14 @@ fn readouts(
     line([0.0, 83.0], &note, SMALL, false, colour);
 }
 
+/// Returns all materials, those that do not evolve last.
+pub(crate) fn known() -> impl Iterator<Item = Material> {
+    Material::ALL.into_iter().chain(Material::ACTUATORS)
+}
+
 /// Returns the materials of a body.
 pub(crate) fn present(body: &Body) -> impl Iterator<Item = Material> {
-    Material::ALL
-        .into_iter()
-        .filter(|m| !m.is_empty() && body.voxels().cells().contains(m))
+    known().filter(|m| !m.is_empty() && body.voxels().cells().contains(m))
 }
 
 fn legend(walk: &Walk, [x, y]: [f64; 2], z: f64, out: &mut Vec<Primitive>) {

@@ -79,26 +79,39 @@
 
   // What the whole walk needs, and a smooth path for the camera where that does not fit. Parts that are flung off do not count.
   const extents = Array.from({ length: N }, (_, f) => {
-    const { left, right, top } = Drawing.extent(Array.from({ length: P }, (_, i) => point(f, i)));
-    return { left, right, top };
+    const { left, right, top, bottom } = Drawing.extent(Array.from({ length: P }, (_, i) => point(f, i)));
+    return { left, right, top, bottom };
   });
+  const terrain = rollout.terrain || [], BELOW = 2;
   const standing = Math.max(1, extents[0].top), size = Math.max(1, extents[0].right - extents[0].left);
   for (const [f, e] of extents.entries()) { const x = origin(f, 0); e.left = Math.max(e.left, x - size); e.right = Math.min(e.right, x + size); }
-  let low = Infinity, high = -Infinity, top = 0;
-  for (const e of extents) { low = Math.min(low, e.left); high = Math.max(high, e.right); top = Math.max(top, e.top); }
-  top = Math.min(Math.max(top + 1, standing + 1.5), 2 * standing + 2);
+  let low = Infinity, high = -Infinity, top = 0, lowest = Infinity;
+  for (const e of extents) { low = Math.min(low, e.left); high = Math.max(high, e.right); top = Math.max(top, e.top); lowest = Math.min(lowest, e.bottom); }
   const left = low - 2.5, right = high + 2.5;
-  const path = new Float64Array(N);
-  for (let f = 0; f < N;) {
-    const [a, b] = rolloutOf(f);
-    let line = Array.from({ length: b - a }, (_, i) => origin(a + i, 0));
-    for (let pass = 0; pass < 2; pass++) {
-      const sums = [0];
-      for (const x of line) sums.push(sums[sums.length - 1] + x);
-      line = line.map((_, i) => { const r = Math.min(50, i, line.length - 1 - i); return (sums[i + r + 1] - sums[i - r]) / (2 * r + 1); });
+  const averaged = (axis) => {
+    const path = new Float64Array(N);
+    for (let f = 0; f < N;) {
+      const [a, b] = rolloutOf(f);
+      let line = Array.from({ length: b - a }, (_, i) => origin(a + i, axis));
+      for (let pass = 0; pass < 2; pass++) {
+        const sums = [0];
+        for (const x of line) sums.push(sums[sums.length - 1] + x);
+        line = line.map((_, i) => { const r = Math.min(50, i, line.length - 1 - i); return (sums[i + r + 1] - sums[i - r]) / (2 * r + 1); });
+      }
+      path.set(line, a);
+      f = Math.max(b, f + 1);
     }
-    path.set(line, a);
-    f = Math.max(b, f + 1);
+    return path;
+  };
+  const path = averaged(0);
+  // The lowest height in the picture of a frame. On terrain it follows a body that climbs or falls, as stage.rs has it.
+  let floor = () => 0;
+  if (!terrain.length) top = Math.min(Math.max(top + 1, standing + 1.5), 2 * standing + 2);
+  else {
+    const tall = Math.max(1, extents[0].top - extents[0].bottom), climbed = top - lowest + BELOW + 1, most = 2 * tall + BELOW + 4, heights = averaged(1);
+    floor = climbed <= most ? () => Math.max(lowest - BELOW, 0)
+      : (f) => Math.max(heights[f] - most / 2, Math.min(extents[f].top, origin(f, 1) + most / 2) + 1 - most, 0);
+    top = Math.min(Math.max(climbed, tall + BELOW + 1.5), most);
   }
 
   let frame = 0;
@@ -136,14 +149,17 @@
     const middle = follow ? Drawing.camera(path[frame], extents[frame], width / scale, 1) : (left + right) / 2;
     const x0 = middle - width / 2 / scale;
     const X = (x) => Math.min(Math.max((x - x0) * scale, -9999), 9999);
-    const Y = (y) => Math.min(Math.max(surface - y * scale, -9999), 9999);
+    const base = floor(frame);
+    const Y = (y) => Math.min(Math.max(surface - (y - base) * scale, -9999), 9999);
     ctx.fillStyle = css("sky"); ctx.fillRect(0, 0, width, height);
-    ctx.fillStyle = css("ground"); ctx.fillRect(0, surface, width, height - surface);
+    ctx.fillStyle = css("ground"); ctx.fillRect(0, Y(0), width, height - Y(0));
     const [first] = rolloutOf(frame), zero = origin(first, 0), begin = origin(phases[phaseOf(frame)].first, 0);
     ctx.strokeStyle = css("mark"); ctx.lineWidth = 1; ctx.setLineDash([5, 5]);
-    for (const x of begin === zero ? [zero] : [zero, begin]) { ctx.beginPath(); ctx.moveTo(X(x), 0); ctx.lineTo(X(x), surface); ctx.stroke(); }
+    for (const x of begin === zero ? [zero] : [zero, begin]) { ctx.beginPath(); ctx.moveTo(X(x), 0); ctx.lineTo(X(x), Y(0)); ctx.stroke(); }
     ctx.setLineDash([]);
-    Drawing.ruler(ctx, { x0, zero, X, scale, width, surface });
+    Drawing.ruler(ctx, { x0, zero, X, scale, width, surface: Y(0) });
+    const seen = { columns: [x0, x0 + width / scale], rows: [base - (height - surface) / scale, base + surface / scale] };
+    for (const object of terrain) Drawing.terrain(ctx, object, seen, { X, Y, scale });
     Drawing.robot(ctx, { ...body, points: Array.from({ length: P }, (_, i) => point(frame, i)) }, { X, Y, scale });
     Drawing.path(ctx, Array.from({ length: frame - first + 1 }, (_, i) => [origin(first + i, 0), origin(first + i, 1)]), { X, Y });
   };
@@ -285,6 +301,8 @@
     button.onclick = () => { arrange(true); seek(firstFrame()); if (!playing) play(true); }; $("phases").append(button);
   }
   const used = new Set(rollout.voxels.map(([m]) => m));
+  // A body that only targets drive (materials 7 and 8) sees nothing.
+  $("stimulus").parentElement.hidden = (used.has(7) || used.has(8)) && ![...used].some((m) => rollout.materials.list[m].sensor);
   rollout.materials.list.forEach((m, k) => {
     if (!used.has(k)) return;
     const item = document.createElement("li");

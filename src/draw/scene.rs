@@ -4,6 +4,7 @@
 use crate::draw::colour;
 use crate::draw::colour::Colour;
 use crate::draw::walk::{Walk, area};
+use crate::sim::TerrainObject;
 use std::fmt;
 use std::str::FromStr;
 
@@ -129,6 +130,10 @@ pub(crate) fn ruler(window: &Window, zero: f64, step: f64) -> impl Iterator<Item
 /// path of the centre of mass. The ruler's zero is the centre of mass at the start of the rollout.
 pub(crate) fn world(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
     let mut out = ground(walk, frame, window);
+    let objects = walk.recording().terrain.iter();
+    for object in objects.flat_map(|terrain| terrain.objects()) {
+        terrain(object, window, &mut out);
+    }
     out.extend(body(walk, frame, window));
     out.extend(path(walk, frame, window));
     out
@@ -178,6 +183,63 @@ fn ground(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
         out.extend(dashes.map(|y| Primitive::line([x, y], [x, y + dash], 1.0, Colour::gray(0.72))));
     }
     out
+}
+
+/// Draws the fixed cells of an object with its outline.
+pub(crate) fn terrain(object: &TerrainObject, window: &Window, out: &mut Vec<Primitive>) {
+    let line = |points: &[[f64; 2]], width, colour| Primitive::Line {
+        points: points.to_vec(),
+        width,
+        colour,
+        smooth: false,
+    };
+    let (seams, outline) = (colour::PAPER, colour::GROUND_LINE);
+    let mut sides = Vec::new();
+    let (left, low) = (i64::from(object.column), i64::from(object.row));
+    let (columns, rows) = (object.cells.width() as i64, object.cells.height() as i64);
+    let is_fixed = |[column, row]: [i64; 2]| {
+        let (down, right) = (low + rows - 1 - row, column - left);
+        object.cells.get(down as isize, right as isize) == Some(&true)
+    };
+    // The cells in the window; casts saturate.
+    let within = |first: i64, count: i64, low: f64, high: f64| {
+        let end = first.saturating_add(count);
+        (low.floor() as i64).clamp(first, end)..(high.ceil() as i64).clamp(first, end)
+    };
+    for row in within(low, rows, window.bottom, window.top) {
+        for column in within(left, columns, window.left, window.right) {
+            if !is_fixed([column, row]) {
+                continue;
+            }
+            let ([left, bottom], [right, top]) = (
+                [column as f64, row as f64],
+                [column as f64 + 1.0, row as f64 + 1.0],
+            );
+            out.push(Primitive::rectangle(
+                [left, top],
+                [right, bottom],
+                colour::GROUND,
+            ));
+            for (beside, side) in [
+                ([column, row + 1], [[left, top], [right, top]]),
+                ([column + 1, row], [[right, top], [right, bottom]]),
+                ([column, row - 1], [[right, bottom], [left, bottom]]),
+                ([column - 1, row], [[left, bottom], [left, top]]),
+            ] {
+                match is_fixed(beside) {
+                    true if window.scale >= MARKED => sides.push(line(&side, 1.0, seams)),
+                    true => {}
+                    false => sides.push(line(&side, 1.5, outline)),
+                }
+            }
+        }
+    }
+    // Seams first, so that they do not cut the outline.
+    let is_seam =
+        |side: &Primitive| matches!(side, Primitive::Line { colour, .. } if *colour == seams);
+    let (inner, outer): (Vec<_>, Vec<_>) = sides.into_iter().partition(is_seam);
+    out.extend(inner);
+    out.extend(outer);
 }
 
 /// Draws the world's columns and rows, and the visible upper part of the ground's voxels.

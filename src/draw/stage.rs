@@ -16,6 +16,8 @@ const GROUND: f64 = 24.0;
 const MARGIN: f64 = 2.5;
 /// The least sky between a body that the camera follows and the edges, voxel lengths.
 const EDGE: f64 = 1.0;
+/// The terrain below a body that a picture shows at least, voxel lengths.
+const BELOW: f64 = 2.0;
 /// Smallest and largest voxel, pixels at zoom 1. The camera follows walks that need smaller ones.
 const VOXEL: RangeInclusive<f64> = 5.5..=22.0;
 /// The frames before and after over which the camera's path is averaged: a cycle, so that the
@@ -24,7 +26,7 @@ const SMOOTHING: usize = 50;
 
 /// The camera and the layout of a picture: the panel on top, the world below it, the ground at the
 /// lower edge. If the whole recording fits, the view is fixed; otherwise the camera follows the
-/// centre of mass smoothly.
+/// centre of mass smoothly, on terrain up and down, too.
 #[derive(Clone, Debug)]
 pub(crate) struct Stage {
     /// The width of the picture, pixels.
@@ -40,8 +42,11 @@ pub(crate) struct Stage {
     crisp: bool,
     look: Look,
     scale: f64,
+    /// The pixel of `floor`.
     surface: f64,
     left: Vec<f64>,
+    /// The height above which the world is shown in each frame, voxel lengths: 0 on flat ground.
+    floor: Vec<f64>,
 }
 
 impl Stage {
@@ -60,9 +65,19 @@ impl Stage {
         let (smallest, largest) = (VOXEL.start() * zoom, VOXEL.end() * zoom);
         let (first, all) = (walk.extent(0..1), walk.extent(0..walk.frames()));
         let size = (first.right - first.left).clamp(1.0, 128.0);
-        let standing = first.top.clamp(1.0, 128.0);
-        // Leaves room for hops; a body that is thrown higher leaves the picture for a moment.
-        let top = (all.top + 1.0).clamp(standing + 1.5, 2.0 * standing + 2.0);
+        let is_flat = walk.recording().terrain.is_none();
+        let top = match is_flat {
+            true => {
+                let standing = first.top.clamp(1.0, 128.0);
+                // Leaves room for hops; a body thrown higher leaves the picture for a moment.
+                (all.top + 1.0).clamp(standing + 1.5, 2.0 * standing + 2.0)
+            }
+            false => {
+                let tall = (first.top - first.bottom).clamp(1.0, 128.0);
+                let climbed = all.top - all.bottom + BELOW + 1.0;
+                climbed.clamp(tall + BELOW + 1.5, 2.0 * tall + BELOW + 4.0)
+            }
+        };
         let (left, right) = reach(walk);
         let fixed = f64::from(width) / (right - left + 2.0 * MARGIN);
         let highest = 1.2 * f64::from(width) / top;
@@ -84,6 +99,12 @@ impl Stage {
         };
         // Whole pixels, so that the ground scrolls without flicker.
         let snap = |x: f64| ((x * scale - f64::from(width) / 2.0).round()) / scale;
+        let floor = if is_flat {
+            Vec::new()
+        } else {
+            let floor = floors(walk, top).into_iter();
+            floor.map(|y| (y * scale).round() / scale).collect()
+        };
         let crisp = false;
         Ok(Stage {
             width,
@@ -96,6 +117,7 @@ impl Stage {
             scale,
             surface,
             left: middle.into_iter().map(snap).collect(),
+            floor,
         })
     }
 
@@ -115,18 +137,18 @@ impl Stage {
     pub(crate) fn to_pixels(&self, frame: usize, [x, y]: [f64; 2]) -> [f64; 2] {
         [
             (x - self.left_edge(frame)) * self.scale,
-            self.surface - y * self.scale,
+            self.surface - (y - self.floor(frame)) * self.scale,
         ]
     }
 
     /// Returns the part of the world in the picture of a frame.
     pub(crate) fn window(&self, frame: usize) -> Window {
-        let left = self.left_edge(frame);
+        let (left, floor) = (self.left_edge(frame), self.floor(frame));
         Window {
             left,
             right: left + f64::from(self.width) / self.scale,
-            bottom: (self.surface - f64::from(self.height)) / self.scale,
-            top: (self.surface - self.panel) / self.scale,
+            bottom: floor + (self.surface - f64::from(self.height)) / self.scale,
+            top: floor + (self.surface - self.panel) / self.scale,
             scale: self.scale,
             zoom: self.zoom,
             crisp: self.crisp,
@@ -141,6 +163,27 @@ impl Stage {
             .copied()
             .unwrap_or(0.0)
     }
+
+    fn floor(&self, frame: usize) -> f64 {
+        let floor = self.floor.get(frame).or(self.floor.last());
+        floor.copied().unwrap_or(0.0)
+    }
+}
+
+/// Returns the lowest height that each picture shows of terrain, if it is `tall` voxel lengths high:
+/// one for all if the whole walk fits, else it follows the body. Nothing lies below 0.
+fn floors(walk: &Walk, tall: f64) -> Vec<f64> {
+    let all = walk.extent(0..walk.frames());
+    if all.top - all.bottom + BELOW + 1.0 <= tall {
+        return vec![(all.bottom - BELOW).max(0.0); walk.frames()];
+    }
+    let path = averaged(walk, 1);
+    let follow = |(frame, centre): (usize, f64)| {
+        let extent = walk.extent(frame..frame + 1);
+        let high = extent.top.min(walk.centre(frame)[1] + tall / 2.0) + EDGE - tall;
+        (centre - tall / 2.0).max(high).max(0.0)
+    };
+    path.into_iter().enumerate().map(follow).collect()
 }
 
 /// Returns the leftmost and rightmost x of the walk. A body that breaks apart counts only up to
@@ -162,15 +205,7 @@ fn reach(walk: &Walk) -> (f64, f64) {
 /// sides, each rollout by itself. It moves farther where the body would leave a picture `wide`
 /// voxel lengths wide; parts that are flung off do not count.
 fn followed(walk: &Walk, wide: f64) -> Vec<f64> {
-    let mut path: Vec<f64> = (0..walk.frames()).map(|f| walk.centre(f)[0]).collect();
-    let mut start = 0;
-    while start < path.len() {
-        let rollout = walk.rollout(start);
-        for _ in 0..2 {
-            smooth(&mut path[rollout.clone()]);
-        }
-        start = rollout.end.max(start + 1);
-    }
+    let mut path = averaged(walk, 0);
     let size = walk.recording().body.width() as f64;
     for (f, x) in path.iter_mut().enumerate() {
         let centre = walk.centre(f)[0];
@@ -182,6 +217,20 @@ fn followed(walk: &Walk, wide: f64) -> Vec<f64> {
             true => x.clamp(low, high),
             false => (left + right) / 2.0,
         };
+    }
+    path
+}
+
+/// Returns a coordinate of the centres, averaged twice, each rollout by itself.
+fn averaged(walk: &Walk, axis: usize) -> Vec<f64> {
+    let mut path: Vec<f64> = (0..walk.frames()).map(|f| walk.centre(f)[axis]).collect();
+    let mut start = 0;
+    while start < path.len() {
+        let rollout = walk.rollout(start);
+        for _ in 0..2 {
+            smooth(&mut path[rollout.clone()]);
+        }
+        start = rollout.end.max(start + 1);
     }
     path
 }

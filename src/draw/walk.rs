@@ -20,11 +20,12 @@ pub struct Walk<'a> {
     sides: Vec<([usize; 2], u32)>,
 }
 
-/// The smallest and largest x, and the largest y, of some points, voxel lengths.
+/// The smallest and largest x and y of some points, voxel lengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Extent {
     pub(crate) left: f64,
     pub(crate) right: f64,
+    pub(crate) bottom: f64,
     pub(crate) top: f64,
 }
 
@@ -172,6 +173,7 @@ impl<'a> Walk<'a> {
         let nothing = Extent {
             left: f64::INFINITY,
             right: f64::NEG_INFINITY,
+            bottom: f64::INFINITY,
             top: 0.0,
         };
         let extent = frames
@@ -180,6 +182,7 @@ impl<'a> Walk<'a> {
         let extent = extent.filter(|p| is_near(p)).fold(nothing, |e, p| Extent {
             left: e.left.min(p[0]),
             right: e.right.max(p[0]),
+            bottom: e.bottom.min(p[1]),
             top: e.top.max(p[1]),
         });
         if extent.left <= extent.right {
@@ -188,6 +191,7 @@ impl<'a> Walk<'a> {
             Extent {
                 left: 0.0,
                 right: width,
+                bottom: 0.0,
                 top: height,
             }
         }

@@ -171,6 +171,7 @@ impl Service {
             let text = "scenario: physics: the page has EvoGym's constants only; morphcog simulate takes others";
             return Err(HttpRefusal::Wrong(text.to_string()));
         }
+        scenario.check_plain().map_err(HttpRefusal::Wrong)?;
         let Protocol {
             start_row: row,
             start_column: column,

@@ -14,4 +14,5 @@ pub mod recording;
 pub mod rollout;
 pub mod score;
 pub mod stimulus;
+pub mod terrain;
 pub mod trace;

@@ -2,11 +2,13 @@
 
 use crate::base::Grid;
 use crate::body::Body;
+use crate::sim::Terrain;
 use crate::task::answer::Readout;
 use crate::task::class_names::ClassNames;
 use crate::task::margins::Margins;
 use crate::task::stimulus::StimulusParams;
 use serde::{Serialize, Serializer};
+use std::sync::Arc;
 
 /// An image of which a body covers a part: pictures frame that part in it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -73,7 +75,7 @@ pub struct Phase {
 }
 
 /// One moment of the robot in voxel lengths: x from its starting box's left edge, y up from the
-/// ground.
+/// ground; on terrain from the left edge of column 0 and the lower edge of row 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     /// Position [x, y] of every point.
@@ -100,6 +102,8 @@ pub struct Recording {
     /// The robot's id or name.
     pub(crate) robot: String,
     pub(crate) body: Body,
+    /// Its terrain; `None` is flat ground.
+    pub(crate) terrain: Option<Arc<Terrain>>,
     /// Its voxels with their corners, row-major; fixed for the rollout.
     pub voxels: Vec<VoxelCorners>,
     /// The phases in order, at least one; the first starts at frame 0.

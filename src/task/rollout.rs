@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 /// Most places of points in a recording: some gigabyte.
-const MOST_PLACES: usize = 50_000_000;
+pub(crate) const MOST_PLACES: usize = 50_000_000;
 
 /// Converts world units to voxel lengths, in which distances are reported, as in the paper.
 pub(crate) fn voxel_lengths(world_units: f64, physics: &Physics) -> f64 {
@@ -25,6 +25,14 @@ pub fn place([x, y]: [f64; 2], physics: &Physics) -> [f64; 2] {
     [
         voxel_lengths(x, physics),
         voxel_lengths(y, physics) - f64::from(physics.ground_row),
+    ]
+}
+
+/// Acts as [`place`] for positions from another origin, added to them \[voxel lengths\].
+pub fn place_from([x, y]: [f64; 2], physics: &Physics, origin: [f64; 2]) -> [f64; 2] {
+    [
+        voxel_lengths(x, physics) + origin[0],
+        voxel_lengths(y, physics) + origin[1],
     ]
 }
 
@@ -272,6 +280,7 @@ pub fn record_unless(
     let mut recording = Recording {
         robot: robot.to_string(),
         body: body.clone(),
+        terrain: None,
         voxels: rollout.voxels(),
         phases: Vec::new(),
         frames: Vec::new(),
@@ -311,11 +320,12 @@ pub fn record_unless(
     Ok(recording)
 }
 
-/// Records the start of a simulation and its present moment under a stimulus, for a picture.
-pub fn moment(world: &World, body: &Body, stimulus: Grid<f64>) -> Recording {
+/// Records the start of a simulation and its present moment under a stimulus, for a picture, with
+/// positions from an origin as [`place_from`] takes it.
+pub fn moment(world: &World, body: &Body, stimulus: Grid<f64>, origin: [f64; 2]) -> Recording {
     let mut start = world.clone();
     start.reset();
-    let frames = vec![frame(&start), frame(world)];
+    let frames = vec![frame_from(&start, origin), frame_from(world, origin)];
     let seen = LabelledStimulus {
         class: 0,
         label: "now".to_string(),
@@ -325,6 +335,7 @@ pub fn moment(world: &World, body: &Body, stimulus: Grid<f64>) -> Recording {
     Recording {
         robot: String::new(),
         body: body.clone(),
+        terrain: world.terrain().cloned(),
         voxels: voxels(world),
         phases: vec![Phase {
             first_frame: 0,
@@ -348,8 +359,17 @@ fn frame(world: &World) -> Frame {
     }
 }
 
+/// Returns the present moment with positions from an origin as [`place_from`] takes it.
+pub(crate) fn frame_from(world: &World, origin: [f64; 2]) -> Frame {
+    let place = |at: [f64; 2]| place_from(at, world.system().physics(), origin);
+    Frame {
+        points: world.points().map(place).collect(),
+        centre: place(world.centre_of_mass()),
+    }
+}
+
 /// Returns the voxels with their corners, as indices into a [`frame`]'s points.
-fn voxels(world: &World) -> Vec<VoxelCorners> {
+pub(crate) fn voxels(world: &World) -> Vec<VoxelCorners> {
     let corner = |((row, column), corners)| VoxelCorners {
         row,
         column,

@@ -3,6 +3,7 @@
 use crate::common::program::{Sandbox, said_of};
 use crate::common::reference::{Reference, golden};
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::time::Duration;
 
 /// A reference rollout as a scenario file, without its name, the width of its world and its results.
@@ -201,7 +202,7 @@ fn a_wrong_scenario_is_refused_with_file_line_and_key() {
         ("{\n\"body\": [[3]],\n\"bodi\": 1}", "s.json:3"),
         ("{\"body\": [[3], [3, 3]]}", "row 1"),
         ("{\"body\": []}", "body"),
-        ("{\"body\": [[7]]}", "body"),
+        ("{\"body\": [[9]]}", "body"),
         ("{\"body\": [[-1]]}", "body"),
         ("{\"body\": [[3.5]]}", "body"),
         ("{\"body\": [[0]]}", "body"),
@@ -262,4 +263,160 @@ fn a_wrong_scenario_is_refused_with_file_line_and_key() {
     let huge = vec![vec![1; 65]; 65];
     sandbox.write("s.json", format!("{{\"body\": {huge:?}}}"));
     sandbox.run("simulate s.json").ended(3, &["65", "64"]);
+}
+
+/// A run on terrain of EvoGym's own simulator, as a scenario, and its trajectory.
+fn on_terrain(name: &str) -> (serde_json::Value, Vec<[f64; 2]>) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/sim/tests/golden/terrain");
+    let file = std::fs::File::open(folder.join(format!("{name}.json.gz"))).unwrap();
+    let run: serde_json::Value =
+        serde_json::from_reader(flate2::read::GzDecoder::new(file)).unwrap();
+    let rows = |rows: &serde_json::Value| -> Vec<Vec<u64>> {
+        let material = |voxel: &serde_json::Value| match voxel.as_u64().unwrap() {
+            actuator @ 3..=4 => actuator + 4,
+            passive => passive,
+        };
+        let row = |row: &serde_json::Value| row.as_array().unwrap().iter().map(material).collect();
+        rows.as_array().unwrap().iter().map(row).collect()
+    };
+    let body = rows(&run["body"]);
+    let actuators = body.iter().flatten().filter(|voxel| **voxel >= 7).count();
+    let phase = run["phase"].as_f64().unwrap();
+    let phases: Vec<f64> = (0..actuators).map(|k| phase * k as f64).collect();
+    let objects: Vec<serde_json::Value> = run["terrain_objects"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|object| {
+            let [column, row, grid] = ["column", "row", "grid"].map(|key| &object[key]);
+            serde_json::json!({ "column": column, "row": row, "grid": grid })
+        })
+        .collect();
+    let com: Vec<[f64; 2]> = serde_json::from_value(run["com"].clone()).unwrap();
+    let scenario = serde_json::json!({
+        "body": body,
+        "start_column": run["start_column"],
+        "start_row": run["start_row"],
+        "terrain": objects,
+        "targets": { "mean": 1.1, "amplitude": 0.5, "period": 25, "phases": phases },
+        "control_steps": com.len() - 1,
+    });
+    (scenario, com)
+}
+
+#[test]
+fn simulate_agrees_with_evogym_on_terrain_with_actuators() {
+    let sandbox = Sandbox::new();
+    for name in ["climber0_2", "platformjumper0_4"] {
+        let (scenario, com) = on_terrain(name);
+        sandbox.write("s.json", scenario.to_string());
+        let ours = rows(&sandbox.run("simulate s.json").ended(0, &[]).out);
+        assert_eq!(ours.len(), com.len());
+        for (step, (ours, theirs)) in ours.iter().zip(&com).enumerate() {
+            let apart = (ours[0] - theirs[0]).abs().max((ours[1] - theirs[1]).abs());
+            assert!(apart < 1e-6, "{name}, step {step}: {apart}");
+        }
+    }
+}
+
+#[test]
+fn listed_targets_move_actuators_as_their_wave_does() {
+    let sandbox = Sandbox::new();
+    let run = |targets: &str| {
+        let scenario = format!(
+            "{{\"body\": [[7, 1], [8, 7]], \"control_steps\": 40, \"targets\": {targets}}}"
+        );
+        sandbox.write("s.json", scenario);
+        let said = sandbox.run("simulate s.json --points").ended(0, &[]);
+        said.out
+    };
+    let wave = run(r#"{"mean": 1.1, "amplitude": 0.5, "period": 20, "phases": [0, 1, 2]}"#);
+    let target = |step: u32, phase: f64| {
+        1.1 + 0.5 * libm::sin(std::f64::consts::TAU * f64::from(step) / 20.0 + phase)
+    };
+    let cycle: Vec<[f64; 3]> = (0..20)
+        .map(|step| [0.0, 1.0, 2.0].map(|phase| target(step, phase)))
+        .collect();
+    let listed = run(&format!("{cycle:?}"));
+    let numbers = |csv: &str| -> Vec<Vec<f64>> {
+        let lines = csv.lines().skip(1);
+        lines
+            .map(|line| line.split(',').map(|text| text.parse().unwrap()).collect())
+            .collect()
+    };
+    let header = wave.lines().next().unwrap();
+    assert!(header.ends_with("pixel_1_1,target_0_0,target_1_0,target_1_1"));
+    let (wave, listed) = (numbers(&wave), numbers(&listed));
+    assert_eq!((wave.len(), wave[0].len()), (41, listed[0].len()));
+    for (a, b) in wave.iter().flatten().zip(listed.iter().flatten()) {
+        assert!((a - b).abs() < 1e-9, "{a} and {b}");
+    }
+    assert!(wave[1][wave[1].len() - 3..] != wave[9][wave[1].len() - 3..]);
+    // Without targets, actuators hold still: nothing pushes sideways in free fall.
+    sandbox.write(
+        "s.json",
+        "{\"body\": [[7, 8]], \"control_steps\": 40, \"start_row\": 90}",
+    );
+    let still = rows(&sandbox.run("simulate s.json").ended(0, &[]).out);
+    assert!((still[40][0] - still[0][0]).abs() < 1e-6);
+}
+
+#[test]
+fn the_ending_of_out_makes_pictures_with_the_terrain() {
+    let sandbox = Sandbox::new();
+    let (mut scenario, _) = on_terrain("upstepper0_2");
+    scenario["control_steps"] = 10.into();
+    sandbox.write("stairs.json", scenario.to_string());
+    for name in ["walk.png", "walk.gif", "walk.html"] {
+        let said = sandbox.run(&format!("simulate stairs.json -o {name}"));
+        assert!(said.ended(0, &[]).out.contains(name));
+    }
+    let begins = |name: &str, with: &[u8]| {
+        assert!(std::fs::read(sandbox.path(name)).unwrap().starts_with(with));
+    };
+    begins("walk.png", b"\x89PNG");
+    begins("walk.gif", b"GIF89a");
+    let page = sandbox.read("walk.html");
+    assert!(page.contains("\"terrain\":[{") && page.contains("actuator, vertical"));
+    sandbox
+        .run("simulate stairs.json -o walk.gif --points")
+        .ended(2, &["--points", "table"]);
+    sandbox
+        .run("simulate stairs.json -o walk.csv --width 200")
+        .ended(2, &["--width", "picture or film"]);
+    // An unstable simulation is drawn up to its end.
+    self::scenario(&sandbox, "unstable_comb");
+    sandbox
+        .run("simulate scenario.json -o comb.png")
+        .ended(4, &["control step 70"]);
+    begins("comb.png", b"\x89PNG");
+}
+
+#[test]
+fn a_wrong_terrain_or_target_is_refused_with_its_key() {
+    let sandbox = Sandbox::new();
+    let ground = r#"{"column": 0, "row": 0, "grid": ["555"]}"#;
+    for (keys, word) in [
+        (format!("\"terrain\": [{ground}]"), "start_column"),
+        (
+            format!("\"terrain\": [{ground}], \"start_column\": 0"),
+            "start_row",
+        ),
+        (
+            format!("\"terrain\": [{ground}], \"start_column\": 0, \"start_row\": 0"),
+            "overlaps",
+        ),
+        (
+            "\"terrain\": [], \"start_column\": 0, \"start_row\": 1".to_string(),
+            "at least one object",
+        ),
+        ("\"terrain\": [{\"column\": -1}]".to_string(), "column"),
+        ("\"targets\": [[1, 1]]".to_string(), "targets[0]"),
+        ("\"targets\": [[1], [1, 1]]".to_string(), "targets"),
+        ("\"targets\": [[1e999]]".to_string(), "targets"),
+        ("\"targets\": {\"mean\": 1}".to_string(), "amplitude"),
+    ] {
+        sandbox.write("s.json", format!("{{\"body\": [[7]], {keys}}}"));
+        sandbox.run("simulate s.json").ended(3, &["s.json", word]);
+    }
 }

@@ -132,6 +132,21 @@ impl PicturesWanted {
         PicturesWanted::of(or_default(formats).iter().map(file).collect())
     }
 
+    /// Returns the picture or film that a file's ending asks for, or the folder of a film's frames;
+    /// none of any other file.
+    ///
+    /// # Errors
+    /// Returns an error if it cannot be written.
+    pub(crate) fn by_ending(path: &Path) -> Result<Option<Self>, Error> {
+        let is_folder = folder::check_is_file_path(path).is_err();
+        let ending = path.extension().map(|ending| ending.to_string_lossy());
+        let is_picture = ending.is_some_and(|ending| Format::from_str(&ending).is_ok());
+        match is_folder || is_picture {
+            true => PicturesWanted::named(path, &[]).map(Some),
+            false => Ok(None),
+        }
+    }
+
     /// Checks that files can be written, before hours of simulation.
     fn of(files: Vec<(Format, PathBuf)>) -> Result<Self, Error> {
         for (format, path) in &files {
