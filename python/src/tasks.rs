@@ -272,7 +272,7 @@ impl TasksData {
             let known = known.join(", ");
             return Err(refused(format!("{name}: expected objects of {known}")));
         }
-        if distance > 1000 || !(range >= 0.0) {
+        if distance > 1000 || range.is_nan() || range < 0.0 {
             let text = "sight_dist, sight_range: expected at most 1000 voxels, and a range from 0";
             return Err(refused(text));
         }
@@ -406,7 +406,7 @@ pub(crate) fn returns<'py>(
     let done = watched(py, |stop| {
         let run = |(number, (body, actions)): (usize, &(Body, Vec<f64>))| {
             let done = episode(&course, body, start, actions, &goals, stop);
-            done.map_err(|error| (number, error))
+            done.map_err(|error| format!("body {number}: {}", error.message))
         };
         pool.install(|| {
             work.par_iter()
@@ -416,7 +416,7 @@ pub(crate) fn returns<'py>(
                 .collect::<Result<Vec<Episode>, _>>()
         })
     })?;
-    let done = done.map_err(|(number, error)| named(raised(&error), number))?;
+    let done = done.map_err(refused)?;
     let array = |of: fn(&Episode) -> f64| PyArray1::from_iter(py, done.iter().map(of));
     Ok((
         array(|episode| episode.reward),

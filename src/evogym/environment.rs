@@ -160,6 +160,24 @@ impl Environment {
         Ok(Outcome { reward, terminated })
     }
 
+    /// Takes a step if it is active, and writes the observation.
+    fn take(
+        &mut self,
+        (action, active): (&[f64], &bool),
+        seen: &mut [f64],
+    ) -> Result<Outcome, Error> {
+        let nothing = Outcome {
+            reward: 0.0,
+            terminated: false,
+        };
+        let outcome = match active {
+            true => self.step(action),
+            false => Ok(nothing),
+        };
+        seen.copy_from_slice(&self.observation);
+        outcome
+    }
+
     fn check(&self, action: &[f64]) -> Result<(), Error> {
         let refused = |found: String| {
             let expected = format!(
@@ -407,7 +425,12 @@ impl Environments {
             let text = format!("actions: expected {} × {width} numbers", self.all.len());
             return Err(Error::usage(text));
         }
-        let work = || self.all.iter().zip(actions.chunks_exact(width)).zip(active);
+        let work = || {
+            self.all
+                .iter()
+                .zip(actions.chunks_exact(width.max(1)))
+                .zip(active)
+        };
         for (number, ((one, action), _)) in work().enumerate().filter(|(_, (_, active))| **active) {
             let checked = one.check(action).and_then(|()| one.check_goals());
             checked.map_err(|error| match several {
@@ -415,38 +438,21 @@ impl Environments {
                 false => error,
             })?;
         }
-        let step =
-            |(((one, action), active), seen): (((&mut Environment, &[f64]), &bool), &mut [f64])| {
-                let outcome = match active {
-                    true => one.step(action),
-                    false => Ok(Outcome {
-                        reward: 0.0,
-                        terminated: false,
-                    }),
-                };
-                seen.copy_from_slice(&one.observation);
-                outcome
-            };
+        let (width, size) = (width.max(1), size.max(1));
         match &self.pool {
             None => {
-                let all = self
-                    .all
-                    .iter_mut()
-                    .zip(actions.chunks_exact(width))
-                    .zip(active);
-                all.zip(observations.chunks_exact_mut(size))
-                    .map(step)
+                let actions = actions.chunks_exact(width).zip(active);
+                let work = self.all.iter_mut().zip(actions);
+                work.zip(observations.chunks_exact_mut(size))
+                    .map(|((one, action), seen)| one.take(action, seen))
                     .collect()
             }
             Some(pool) => pool.install(|| {
-                let all = self
-                    .all
-                    .par_iter_mut()
-                    .zip(actions.par_chunks_exact(width))
-                    .zip(active);
-                all.zip(observations.par_chunks_exact_mut(size))
+                let actions = actions.par_chunks_exact(width).zip(active);
+                let work = self.all.par_iter_mut().zip(actions);
+                work.zip(observations.par_chunks_exact_mut(size))
                     .with_max_len(1)
-                    .map(step)
+                    .map(|((one, action), seen)| one.take(action, seen))
                     .collect()
             }),
         }

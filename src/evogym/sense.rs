@@ -3,6 +3,7 @@
 use crate::evogym::worlds::Object;
 
 /// EvoGym's π, of orientations only.
+#[expect(clippy::approx_constant, reason = "the digits that EvoGym has")]
 const PI: f64 = 3.1415926;
 /// The cosine that stands for one that rounding has made larger than 1.
 const ALMOST: f64 = 0.99999;
