@@ -62,7 +62,7 @@ EOF
   # The signal before a time limit of a minute. Slurm looks every 30 seconds, and sends it up to 30 seconds early: 15 to 45
   # seconds after the start. The run takes longer than that.
   mkdir limit
-  plan limit 2500
+  plan limit 4000
   morphcog sweep limit/plan.toml --set 'seeds=[1]' --out limit/runs --slurm > limit/job.sh
   sbatch --time=1 --signal=B:USR1@15 limit/job.sh
   # A task is killed, and the job is submitted again.
@@ -70,7 +70,7 @@ EOF
   morphcog sweep plan.toml --slurm > job.sh
   sbatch job.sh
   killer "$work/slurm/.*runs/plan .* --task" 3
-  finished 480 || { cat limit/runs/slurm-*.log; exit 1; }
+  finished 600 || { cat limit/runs/slurm-*.log; exit 1; }
   sbatch job.sh
   finished 240 || { cat runs/plan/slurm-*.log; exit 1; }
   same "$work/slurm/runs/plan" "Slurm, tasks killed" || { cat runs/plan/slurm-*.log; exit 1; }

@@ -3,19 +3,17 @@
 use super::program::{Sandbox, skipped};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
-use rustix::process::{Pid, Signal, kill_process_group};
 use serde_json::{Value, json};
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::thread::JoinHandle;
+use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 /// Time limit of every wait.
-const LIMIT: Duration = Duration::from_secs(60);
+const LIMIT: Duration = Duration::from_secs(120);
 const NAMES: [&str; 4] = [
     "chromium",
     "chromium-browser",
@@ -94,7 +92,7 @@ impl Browser {
             .arg("about:blank")
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
-            // A group of its own, which can be slowed down.
+            // A group of its own, whose processor time can be told.
             .process_group(0)
             .spawn()
             .unwrap();
@@ -127,25 +125,21 @@ impl Browser {
         }
     }
 
-    /// Slows all of its processes down until the result is dropped: of every 20 ms they run in one
-    /// part of this many.
-    pub fn slowed(&self, parts: u32) -> Slowed {
-        let group = Pid::from_child(&self.child);
-        let (end, ended) = channel();
-        let cycle = Duration::from_millis(20);
-        let pulse = std::thread::spawn(move || {
-            let mut goes_on = true;
-            while goes_on {
-                let _ = kill_process_group(group, Signal::STOP);
-                std::thread::sleep(cycle * (parts - 1) / parts);
-                let _ = kill_process_group(group, Signal::CONT);
-                goes_on = ended.recv_timeout(cycle / parts) == Err(RecvTimeoutError::Timeout);
-            }
-        });
-        Slowed {
-            end: Some(end),
-            pulse: Some(pulse),
-        }
+    /// Returns the processor time of all its processes so far, where `/proc` tells.
+    pub fn processor_time(&self) -> Option<Duration> {
+        let group = self.child.id().to_string();
+        let ticks = std::fs::read_dir("/proc")
+            .ok()?
+            .flatten()
+            .filter_map(|process| {
+                let text = std::fs::read_to_string(process.path().join("stat")).ok()?;
+                // After the name: state, parent, group, ...; user and system time are the 12th and 13th.
+                let fields: Vec<&str> = text.rsplit_once(')')?.1.split_whitespace().collect();
+                let is_own = *fields.get(2)? == group;
+                let of = |k: usize| fields.get(k)?.parse::<u64>().ok();
+                is_own.then_some(of(11)? + of(12)?)
+            });
+        Some(Duration::from_millis(10 * ticks.sum::<u64>()))
     }
 
     fn next(&mut self, until: Instant) -> Value {
@@ -215,21 +209,6 @@ impl Drop for Browser {
         }
         let _ = self.child.kill();
         let _ = self.child.wait();
-    }
-}
-
-/// A browser that is slowed down.
-pub struct Slowed {
-    end: Option<Sender<()>>,
-    pulse: Option<JoinHandle<()>>,
-}
-
-impl Drop for Slowed {
-    fn drop(&mut self) {
-        drop(self.end.take());
-        if let Some(pulse) = self.pulse.take() {
-            let _ = pulse.join();
-        }
     }
 }
 

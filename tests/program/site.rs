@@ -5,14 +5,14 @@
 use crate::common::browser::{Browser, Tab, found, keep_picture};
 use crate::common::program::Sandbox;
 use crate::common::server::Server;
-use crate::serve_page::{answer, as_fast_as_possible, one};
+use crate::serve_page::as_fast_as_possible;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// The path below which the files are served: a site need not be at the root.
 const BELOW: &str = "/some/where/";
@@ -264,10 +264,9 @@ fn once_it_is_open_the_page_needs_no_server() {
     assert_eq!(tab.eval(shared), false);
     tab.wait("document.getElementById('engine').textContent");
     site.end();
-    as_fast_as_possible(&mut tab);
+    // The team needs further workers.
     tab.click("#tab-team");
-    let (says, _) = answer(&mut tab, &one());
-    assert_eq!(says, "1");
+    tab.wait("/step [3-9][0-9]/.test(document.getElementById('moved').textContent)");
     assert_eq!(tab.complaints(), Vec::<String>::new());
 }
 
@@ -299,27 +298,30 @@ fn in_a_hidden_tab_nothing_is_computed() {
     tab.wait(&format!("window.calls > {before} + 5"));
 }
 
+/// The processor time that all of a browser's processes may need to the first walk, on a machine
+/// that is busy otherwise; on one that is not they need a third of it. A phone's four cores of a
+/// quarter of the speed do so much in three seconds.
+const TO_FIRST_WALK: Duration = Duration::from_secs(3);
+
 #[test]
-fn on_a_processor_a_quarter_as_fast_the_first_walk_begins_within_three_seconds() {
+fn the_first_walk_begins_within_three_seconds_of_a_processor_a_quarter_as_fast() {
     let Some(program) = found() else { return };
     let sandbox = Sandbox::new();
     let site = site(&sandbox);
-    // The machine may be busy otherwise: one of three will do.
-    let took = (0..3).map(|_| {
+    // Time on the clock would depend on what else the machine does; and so does, a little, that of
+    // the processor.
+    let needs = (0..3).map(|_| {
         let mut browser = Browser::start(&program, &sandbox);
-        let _slowed = browser.slowed(4);
+        let before = browser.processor_time()?;
         let mut tab = browser.tab(390, 844, false);
-        let begin = Instant::now();
         tab.open(&site.url());
         tab.wait("Number(document.getElementById('time')?.value) > 0");
-        begin.elapsed()
+        Some(browser.processor_time()? - before)
     });
-    let took: Vec<Duration> = took.collect();
-    eprintln!("first walk after {took:?}");
-    assert!(
-        took.iter().min() < Some(&Duration::from_secs(3)),
-        "{took:?}"
-    );
+    let needs: Option<Vec<Duration>> = needs.collect();
+    let least = needs.and_then(|needs| needs.into_iter().min());
+    eprintln!("{least:?} of the processor to the first walk");
+    assert!(least.is_none_or(|least| least < TO_FIRST_WALK), "{least:?}");
 }
 
 #[test]

@@ -8,7 +8,7 @@ use std::str::FromStr;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "u8", into = "u8"))]
-#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema), schemars(extend("maximum" = 6)))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema), schemars(extend("maximum" = 8)))]
 #[repr(u8)]
 pub enum Material {
     /// No voxel.
@@ -25,10 +25,14 @@ pub enum Material {
     SensorShrink = 5,
     /// Sensor that gets wider with its pixel's intensity.
     SensorExpand = 6,
+    /// Actuator of EvoGym's robots: takes the width that it is given at every control step.
+    ActuatorHorizontal = 7,
+    /// Actuator of EvoGym's robots: takes the height that it is given at every control step.
+    ActuatorVertical = 8,
 }
 
 impl Material {
-    /// All materials, in the order of their numbers.
+    /// The materials that evolve, in the order of their numbers: all but actuators.
     pub const ALL: [Material; 7] = [
         Material::Empty,
         Material::Rigid,
@@ -39,14 +43,19 @@ impl Material {
         Material::SensorExpand,
     ];
 
-    /// Returns its number, 0…6.
+    /// The materials that are given their size at every control step
+    /// ([`World::set_targets`](crate::World::set_targets)).
+    pub const ACTUATORS: [Material; 2] = [Material::ActuatorHorizontal, Material::ActuatorVertical];
+
+    /// Returns its number, 0…8.
     pub fn code(self) -> u8 {
         self as u8
     }
 
-    /// Returns the material with a number, `None` above 6.
+    /// Returns the material with a number, `None` above 8.
     pub fn from_code(code: u8) -> Option<Self> {
-        Material::ALL.get(usize::from(code)).copied()
+        let mut all = Material::ALL.into_iter().chain(Material::ACTUATORS);
+        all.nth(usize::from(code))
     }
 
     /// Returns true if there is no voxel.
@@ -64,9 +73,14 @@ impl Material {
         matches!(self, Material::SensorShrink | Material::SensorExpand)
     }
 
-    /// Returns true if its width is actuated: muscles and sensors.
+    /// Returns true if it is given its size at every control step.
+    pub fn is_actuator(self) -> bool {
+        Material::ACTUATORS.contains(&self)
+    }
+
+    /// Returns true if its width or height is actuated: muscles, sensors and actuators.
     pub fn is_active(self) -> bool {
-        self.is_muscle() || self.is_sensor()
+        self.is_muscle() || self.is_sensor() || self.is_actuator()
     }
 
     /// Returns its name in pictures and tables.
@@ -79,6 +93,8 @@ impl Material {
             Material::MuscleAntiphase => "muscle, antiphase",
             Material::SensorShrink => "sensor, shrinks",
             Material::SensorExpand => "sensor, expands",
+            Material::ActuatorHorizontal => "actuator, horizontal",
+            Material::ActuatorVertical => "actuator, vertical",
         }
     }
 }
@@ -86,7 +102,7 @@ impl Material {
 /// A number that belongs to no material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{0} is not a material; expected 0…6 (0 empty, 1 rigid, 2 soft, 3 and 4 muscle, 5 and 6 sensor)"
+    "{0} is not a material; expected 0…8 (0 empty, 1 rigid, 2 soft, 3 and 4 muscle, 5 and 6 sensor, 7 and 8 actuator)"
 )]
 pub struct UnknownMaterial(pub u8);
 
@@ -107,7 +123,7 @@ impl From<Material> for u8 {
 pub const MAX_SIDE: usize = 64;
 
 /// A robot's body: H × W voxels, row 0 on top. Empty rows and columns count: pixel (row, column) of
-/// a stimulus drives voxel (row, column). In files: rows of numbers 0…6 (see [`Material`]).
+/// a stimulus drives voxel (row, column). In files: rows of numbers 0…8 (see [`Material`]).
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(
@@ -148,9 +164,9 @@ pub enum BodyError {
         /// Columns found.
         width: usize,
     },
-    /// A character of the text form is not a digit 0…6.
+    /// A character of the text form is not a digit 0…8.
     #[error(
-        "row {row}, column {column}: '{found}' is not a voxel; expected a digit 0…6 (or '.' for empty)"
+        "row {row}, column {column}: '{found}' is not a voxel; expected a digit 0…8 (or '.' for empty)"
     )]
     Voxel {
         /// Row from the top, from 0.
@@ -266,7 +282,7 @@ impl From<Body> for Grid<Material> {
     }
 }
 
-/// Writes the text form: one line of digits 0…6 per row.
+/// Writes the text form: one line of digits 0…8 per row.
 impl fmt::Display for Body {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (i, row) in self.0.rows().enumerate() {
@@ -325,21 +341,21 @@ mod tests {
             serde_json::from_str::<Body>("[[0,1,2,3],[4,5,6,0]]").unwrap(),
             b
         );
-        let error = serde_json::from_str::<Body>("[[0,7]]")
+        let error = serde_json::from_str::<Body>("[[0,9]]")
             .unwrap_err()
             .to_string();
-        assert!(error.contains('7') && error.contains("0…6"), "{error}");
+        assert!(error.contains('9') && error.contains("0…8"), "{error}");
     }
 
     #[test]
     fn what_is_not_a_body_is_refused_with_its_place() {
-        let error = "012\n078".parse::<Body>().unwrap_err();
+        let error = "012\n098".parse::<Body>().unwrap_err();
         assert_eq!(
             error,
             BodyError::Voxel {
                 row: 1,
                 column: 1,
-                found: '7'
+                found: '9'
             }
         );
         assert!(matches!("01\n0".parse::<Body>(), Err(BodyError::Shape(_))));

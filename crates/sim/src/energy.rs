@@ -8,6 +8,7 @@
 //! part of the change is 0 up to rounding.
 
 use crate::lattice::{FAMILIES, spring_index};
+use crate::scratch::Scratch;
 use crate::state::{Pair, State, X, Y};
 use crate::system::System;
 
@@ -45,7 +46,8 @@ pub(crate) struct Meter {
     weight: f64,
     /// Half of a point's mass.
     half_mass: f64,
-    /// Goals of the current control step; empty before the first (lengths then).
+    /// Goals of the current control step, horizontal and off the lattice, then vertical; empty before
+    /// the first (lengths then).
     goals: Vec<f64>,
     before: f64,
     pub energy: Energy,
@@ -61,6 +63,7 @@ impl Meter {
             [0, lattice.pitch + 1],
             [1, lattice.pitch],
         ];
+        let has_vertical = !lattice.actuated_vertical.is_empty();
         let mut springs = Vec::new();
         for (slot, family) in
             (0..lattice.slots).flat_map(|slot| (0..FAMILIES).map(move |f| (slot, f)))
@@ -70,7 +73,11 @@ impl Meter {
                 springs.push(Spring {
                     ends: ends[family].map(|offset| slot + offset),
                     half: half * lattice.stiffness[index],
-                    goal: (family == 0).then_some(slot),
+                    goal: match family {
+                        0 => Some(slot),
+                        1 if has_vertical => Some(lattice.goal_count() + slot),
+                        _ => None,
+                    },
                     length: lattice.lengths[family],
                 });
             }
@@ -104,16 +111,17 @@ impl Meter {
     }
 
     /// Records new goals at the start of a control step.
-    pub fn drive(&mut self, goals: &[f64], position: &Pair) {
+    pub fn drive(&mut self, scratch: &Scratch, position: &Pair) {
         let before = self.potential(position);
-        self.set_goals(goals);
+        self.set_goals(scratch);
         self.energy.drive += self.potential(position) - before;
     }
 
     /// Records the goals of the control step just completed.
-    pub fn set_goals(&mut self, goals: &[f64]) {
+    pub fn set_goals(&mut self, scratch: &Scratch) {
         self.goals.clear();
-        self.goals.extend_from_slice(goals);
+        self.goals.extend_from_slice(&scratch.goals);
+        self.goals.extend_from_slice(&scratch.vertical_goals);
     }
 
     /// Measures before the limits are applied.

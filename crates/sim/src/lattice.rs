@@ -10,6 +10,8 @@ use crate::body::{Body, Material};
 use crate::grid::Grid;
 use crate::physics::Physics;
 use crate::simd::{BLOCK, Buffer};
+use crate::step::off_lattice::GROUP;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Sides of a voxel as visited: top, right, bottom, left; clockwise, so the normal is to the left.
@@ -34,10 +36,10 @@ pub(crate) struct OffLatticeSpring {
     pub stiffness: f64,
 }
 
-/// A horizontal side actuated by active voxels.
+/// A side actuated by active voxels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ActuatedSide {
-    /// Index into the goals: a horizontal spring's slot, or `len` + index off the lattice.
+    /// Index into the goals of its direction: a spring's slot, or `len` + index off the lattice.
     pub goal: usize,
     /// The one or two active voxels that share it, as indices into [`Lattice::active`].
     pub voxels: [usize; 2],
@@ -82,7 +84,10 @@ pub(crate) struct Lattice {
     /// Bit mask of every spring: all bits but the sign's, or 0 (see `Lanes::bits_and`).
     pub(crate) exists: Buffer,
     pub(crate) off_lattice_springs: Vec<OffLatticeSpring>,
+    /// Horizontal sides, and those off the lattice in either direction.
     pub(crate) actuated: Vec<ActuatedSide>,
+    /// Vertical sides on the lattice; empty without vertical actuators.
+    pub(crate) actuated_vertical: Vec<ActuatedSide>,
     pub(crate) active: Vec<ActiveVoxel>,
     /// Sides of rigid voxels, in an order that gives the same results as the rigid pass's.
     pub(crate) rigid_links: Vec<[usize; 2]>,
@@ -91,8 +96,9 @@ pub(crate) struct Lattice {
     pub(crate) points: Vec<(usize, (usize, usize))>,
     /// Non-empty voxels, row-major, with their points clockwise from the top left.
     pub(crate) voxels: Vec<((usize, usize), [usize; 4])>,
-    /// Rows of the body, empty ones included.
+    /// Rows and columns of the body, empty ones included.
     pub(crate) body_rows: usize,
+    pub(crate) body_columns: usize,
 }
 
 impl Lattice {
@@ -113,6 +119,7 @@ impl Lattice {
             exists: Buffer::zeros(slots * FAMILIES),
             off_lattice_springs: Vec::new(),
             actuated: Vec::new(),
+            actuated_vertical: Vec::new(),
             active: Vec::new(),
             rigid_links: Vec::new(),
             lattice_slots: voxels.lattice_slots,
@@ -120,6 +127,7 @@ impl Lattice {
             points: Vec::new(),
             voxels: voxels.list,
             body_rows: body.height(),
+            body_columns: body.width(),
         };
         lattice.add_points();
         lattice.add_springs(body, physics);
@@ -200,6 +208,12 @@ impl Lattice {
         }
     }
 
+    /// Returns the number of goals of horizontal springs and of those off the lattice, in whole
+    /// groups.
+    pub(crate) fn goal_count(&self) -> usize {
+        self.len + self.off_lattice_springs.len() + GROUP
+    }
+
     fn find_active_ranges(&mut self) {
         let mut used = vec![false; self.slots / BLOCK];
         for (point, _) in &self.points {
@@ -226,7 +240,8 @@ impl Lattice {
     }
 
     fn add_actuation(&mut self, body: &Body) {
-        let mut owner = std::collections::BTreeMap::new();
+        // A horizontal and a vertical side may begin in the same slot.
+        let mut owners = [const { BTreeMap::new() }; 2];
         for &(place, [tl, tr, br, bl]) in &self.voxels {
             let material = body.voxels()[place];
             if !material.is_active() {
@@ -234,19 +249,25 @@ impl Lattice {
             }
             let voxel = self.active.len();
             self.active.push(ActiveVoxel { material, place });
-            for ends in [[tl, tr], [bl, br]] {
+            let is_vertical = material == Material::ActuatorVertical;
+            let sides = match is_vertical {
+                true => [[tl, bl], [tr, br]],
+                false => [[tl, tr], [bl, br]],
+            };
+            for ends in sides {
                 let off_lattice = self
                     .off_lattice_springs
                     .iter()
                     .position(|spring| spring.ends == ends);
                 let goal = off_lattice.map_or(ends[0], |index| self.len + index);
+                let owner = &mut owners[usize::from(is_vertical && off_lattice.is_none())];
                 owner.entry(goal).or_insert([voxel, voxel])[1] = voxel;
             }
         }
-        self.actuated = owner
-            .into_iter()
-            .map(|(goal, voxels)| ActuatedSide { goal, voxels })
-            .collect();
+        [self.actuated, self.actuated_vertical] = owners.map(|owner: BTreeMap<_, _>| {
+            let side = |(goal, voxels)| ActuatedSide { goal, voxels };
+            owner.into_iter().map(side).collect()
+        });
     }
 }
 

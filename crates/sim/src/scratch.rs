@@ -26,6 +26,8 @@ pub(crate) struct Work {
 pub(crate) struct Scratch {
     /// Goal lengths \[wu\]: horizontal springs by slot, then off-lattice springs.
     pub goals: Buffer,
+    /// Goal lengths of vertical springs by slot \[wu\]; empty without vertical actuators.
+    pub vertical_goals: Buffer,
     /// Springs by blocks.
     pub springs: Vec<Springs>,
     pub work: Vec<Work>,
@@ -67,6 +69,10 @@ impl Scratch {
         let parked = || state.position.clone();
         Scratch {
             goals: horizontal.chain(off_lattice).chain(padding).collect(),
+            vertical_goals: match lattice.actuated_vertical.is_empty() {
+                true => Buffer::zeros(0),
+                false => Buffer::filled(lattice.len, physics.cell_size),
+            },
             springs: Springs::blocks(&lattice.stiffness, physics.mass, physics.servo_gain),
             work: vec![work; lattice.slots / BLOCK],
             carry: pair(lattice.len),

@@ -2,6 +2,7 @@
 
 use crate::simd::Buffer;
 use crate::system::System;
+use crate::terrain::height;
 
 /// Height at which slots without a point are parked \[wu\]: far from every point, above the floor.
 const PARKED: f64 = 1e6;
@@ -44,16 +45,27 @@ pub struct State {
 }
 
 impl State {
-    /// Makes the undeformed body at rest, its bottom row (empty rows count) at a grid row.
-    pub(crate) fn at_rest(System { lattice, physics }: &System, start_row: u32) -> Self {
+    /// Makes the undeformed body at rest, its bottom row (empty rows count) at a grid row. On a
+    /// terrain heights are rounded as EvoGym's: whether a body that begins at a wall or on the
+    /// ground touches it is decided by their last bits.
+    pub(crate) fn at_rest(
+        System { lattice, physics }: &System,
+        start_row: u32,
+        on_terrain: bool,
+    ) -> Self {
         // Slots without a point get positions of their own, so that no distance is 0.
         let parked = (0..lattice.len).map(|i| -1e3 - i as f64).collect();
         let mut position: Pair = [parked, Buffer::filled(lattice.len, PARKED)];
         for &(point, (row, column)) in &lattice.points {
             // Computed from integer grid indices, so that coincident points have the same bits.
             position[X][point] = column as f64 * physics.cell_size;
-            position[Y][point] =
-                (start_row as usize + lattice.body_rows - row) as f64 * physics.cell_size;
+            position[Y][point] = match on_terrain {
+                true => {
+                    let bottom = f64::from(start_row);
+                    height(bottom, lattice.body_rows, row, physics.cell_size)
+                }
+                false => (start_row as usize + lattice.body_rows - row) as f64 * physics.cell_size,
+            };
         }
         let velocity = pair(lattice.len);
         State {

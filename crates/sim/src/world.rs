@@ -1,13 +1,15 @@
-//! [`World`]: one simulation of one robot on flat ground.
+//! [`World`]: one simulation of one robot, on flat ground or a terrain.
 
 use crate::energy::{Energy, Meter};
 use crate::grid::Grid;
+use crate::lattice::ActiveVoxel;
 use crate::scratch::Scratch;
 use crate::simd::{InstructionSet, dispatch};
 use crate::state::{State, X, Y};
-use crate::step::{ControlStep, Ended, actuation};
+use crate::step::{ControlStep, Ended, Ground, actuation};
 use crate::stop::{NEVER, Stopped};
 use crate::system::System;
+use crate::terrain::Terrain;
 use crate::unstable::{StepError, Unstable, UnstableReason};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -16,9 +18,9 @@ use std::sync::atomic::AtomicBool;
 /// count).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Start {
-    /// Column \[voxels\]. It matters only to the positions of the pegs below the ground.
+    /// Column \[voxels\]. On flat ground it matters only to the positions of the pegs below.
     pub column: i64,
-    /// Row \[voxels\]. A body at `Physics::ground_row` (2) stands on the ground.
+    /// Row \[voxels\]. A body at `Physics::ground_row` (2) stands on flat ground.
     pub row: u32,
 }
 
@@ -27,14 +29,43 @@ pub struct Start {
 #[error("the state is that of another body")]
 pub struct StateMismatch;
 
+/// A robot's box, empty voxels included, that overlaps a fixed cell at its start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the robot's box overlaps the terrain at column {column}, row {row}")]
+pub struct StartError {
+    /// Column of the cell.
+    pub column: i64,
+    /// Row of the cell, from the floor plane.
+    pub row: i64,
+}
+
+/// The reason why targets are refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum TargetsError {
+    /// There are more or fewer than actuators.
+    #[error("expected {expected} targets, one for each actuator; found {found}")]
+    Count {
+        /// The number of actuators.
+        expected: usize,
+        /// The number of targets.
+        found: usize,
+    },
+    /// A target is not a number.
+    #[error("target {0} is not a number")]
+    NotANumber(usize),
+}
+
 /// One simulation: a system, its state and the current stimulus.
 #[derive(Clone, Debug)]
 pub struct World {
     pub(crate) system: Arc<System>,
     pub(crate) start: Start,
+    /// `None` is flat ground.
+    pub(crate) terrain: Option<Arc<Terrain>>,
     pub(crate) state: State,
     pub(crate) scratch: Scratch,
-    /// The pixel of each active voxel, in [0, 1]; muscles have one too, unused.
+    /// The pixel of each active voxel, in [0, 1]; muscles have one too, unused. Of an actuator its
+    /// target.
     pixels: Vec<f64>,
     targets: Vec<f64>,
     pub(crate) instructions: InstructionSet,
@@ -43,16 +74,44 @@ pub struct World {
 
 impl World {
     /// Makes a robot at rest, all pixels dark. Takes a [`System`] or an `Arc` of one.
+    /// Actuators have their rest lengths.
     pub fn new(system: impl Into<Arc<System>>, start: Start) -> Self {
-        let system = system.into();
-        let state = State::at_rest(&system, start.row);
-        let active = system.lattice.active.len();
+        World::standing(system.into(), start, None)
+    }
+
+    /// Makes a robot at rest on a terrain, all pixels dark and all actuators at their rest lengths.
+    /// Below the terrain, and beside it, is the floor plane.
+    ///
+    /// # Errors
+    /// Returns a [`StartError`] if the robot's box overlaps a fixed cell.
+    pub fn on_terrain(
+        system: impl Into<Arc<System>>,
+        start: Start,
+        terrain: impl Into<Arc<Terrain>>,
+    ) -> Result<Self, StartError> {
+        let (system, terrain) = (system.into(), terrain.into());
+        let (rows, columns) = (system.lattice.body_rows, system.lattice.body_columns);
+        for row in (0..rows).map(|up| i64::from(start.row) + up as i64) {
+            for column in (0..columns).map(|right| start.column.saturating_add(right as i64)) {
+                if terrain.is_fixed(column, row) {
+                    return Err(StartError { column, row });
+                }
+            }
+        }
+        Ok(World::standing(system, start, Some(terrain)))
+    }
+
+    fn standing(system: Arc<System>, start: Start, terrain: Option<Arc<Terrain>>) -> Self {
+        let state = State::at_rest(&system, start.row, terrain.is_some());
+        let active = &system.lattice.active;
+        let pixel = |voxel: &ActiveVoxel| f64::from(u8::from(voxel.material.is_actuator()));
         World {
             start,
+            terrain,
             scratch: Scratch::new(&system, &state),
             state,
-            pixels: vec![0.0; active],
-            targets: vec![0.0; active],
+            pixels: active.iter().map(pixel).collect(),
+            targets: vec![0.0; active.len()],
             instructions: InstructionSet::in_use(),
             meter: None,
             system,
@@ -85,9 +144,9 @@ impl World {
             .map_or_else(Energy::default, |meter| meter.energy)
     }
 
-    /// Returns to the start; the stimulus stays.
+    /// Returns to the start; the stimulus and the actuators' targets stay.
     pub fn reset(&mut self) {
-        self.state = State::at_rest(&self.system, self.start.row);
+        self.state = State::at_rest(&self.system, self.start.row, self.terrain.is_some());
         self.meter.iter_mut().for_each(Meter::rest);
     }
 
@@ -95,8 +154,35 @@ impl World {
     pub fn set_stimulus(&mut self, stimulus: &Grid<f64>) {
         for (voxel, pixel) in self.system.lattice.active.iter().zip(&mut self.pixels) {
             let (row, column) = voxel.place;
-            *pixel = stimulus.or_default((row, column));
+            if !voxel.material.is_actuator() {
+                *pixel = stimulus.or_default((row, column));
+            }
         }
+    }
+
+    /// Sets the lengths that the actuators are to take from the next control step on: one for each,
+    /// row-major from the top left, in multiples of the rest length. They are cut to the physics'
+    /// `target_min` and `target_max` (0.6 and 1.6).
+    ///
+    /// # Errors
+    /// Returns a [`TargetsError`], and changes nothing, if there are more or fewer than actuators,
+    /// or if one is not a number.
+    pub fn set_targets(&mut self, targets: &[f64]) -> Result<(), TargetsError> {
+        let (active, physics) = (&self.system.lattice.active, &self.system.physics);
+        let actuators = || active.iter().filter(|voxel| voxel.material.is_actuator());
+        let (expected, found) = (actuators().count(), targets.len());
+        if expected != found {
+            return Err(TargetsError::Count { expected, found });
+        }
+        if let Some(number) = targets.iter().position(|target| target.is_nan()) {
+            return Err(TargetsError::NotANumber(number));
+        }
+        let places = active.iter().zip(&mut self.pixels);
+        let places = places.filter(|(voxel, _)| voxel.material.is_actuator());
+        for ((_, place), target) in places.zip(targets) {
+            *place = target.clamp(physics.target_min, physics.target_max);
+        }
+        Ok(())
     }
 
     /// Simulates one control step.
@@ -116,16 +202,21 @@ impl World {
         let World {
             system,
             start,
+            terrain,
             state,
             scratch,
             meter,
             ..
         } = self;
         let control_step = state.control_step;
-        let (system, meter, start_column) = (&**system, meter.as_mut(), start.column);
+        let (system, meter) = (&**system, meter.as_mut());
+        let ground = Ground {
+            terrain: terrain.as_deref(),
+            start_column: start.column,
+        };
         let steps = ControlStep {
             system,
-            start_column,
+            ground,
             state,
             scratch,
             meter,
@@ -159,11 +250,11 @@ impl World {
             state.control_step,
             pixels,
             targets,
-            &mut scratch.goals,
+            [&mut scratch.goals, &mut scratch.vertical_goals],
         );
         meter
             .iter_mut()
-            .for_each(|meter| meter.drive(&scratch.goals, &state.position));
+            .for_each(|meter| meter.drive(scratch, &state.position));
     }
 
     /// Completes a control step. Every substep checks the one before, so the last is checked here.
@@ -205,6 +296,19 @@ impl World {
             .points
             .iter()
             .map(|&(point, _)| [x[point], y[point]])
+    }
+
+    /// Returns the velocities of all points [x, y] \[wu/s\], as integrated, in the order of
+    /// [`World::points`]: the length limits move points without changing them.
+    pub fn velocities(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
+        let [x, y] = &self.state.velocity;
+        let points = self.system.lattice.points.iter();
+        points.map(|&(point, _)| [x[point], y[point]])
+    }
+
+    /// Returns the terrain; `None` is flat ground.
+    pub fn terrain(&self) -> Option<&Arc<Terrain>> {
+        self.terrain.as_ref()
     }
 
     /// Returns every non-empty voxel's (row, column) and its corners (top left, top right, bottom

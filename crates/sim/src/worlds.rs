@@ -3,7 +3,7 @@
 use crate::grid::Grid;
 use crate::simd::{BLOCK, Kernel, Lanes, dispatch};
 use crate::step::limits::{SharedRigidPass, limit_rigid};
-use crate::step::{Ended, before_rigid};
+use crate::step::{Ended, Ground, before_rigid};
 use crate::stop::{NEVER, Stopped, check};
 use crate::system::System;
 use crate::unstable::{Unstable, UnstableReason};
@@ -132,12 +132,17 @@ impl Kernel for SideBySide<'_, '_> {
             for (world, ended) in worlds.iter_mut().filter(|(_, ended)| ended.is_none()) {
                 let World {
                     start,
+                    terrain,
                     state,
                     scratch,
                     meter,
                     ..
                 } = &mut **world;
-                let done = before_rigid::<L>(system, start.column, state, scratch, meter.as_mut());
+                let ground = Ground {
+                    terrain: terrain.as_deref(),
+                    start_column: start.column,
+                };
+                let done = before_rigid::<L>(system, ground, state, scratch, meter.as_mut());
                 **ended = done.err().map(|reason: UnstableReason| Unstable {
                     control_step: state.control_step,
                     reason,

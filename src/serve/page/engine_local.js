@@ -231,17 +231,17 @@ const team = async (path, value, signal, tell) => {
     const data = await Promise.all(parts.map((part) => part.begin("/" + path, body))), { until } = data[0];
     running.set(id, { change: async (news) => { clock.set(news); return null; } });
     tell("begin", { ...data[0], id, members: members.map((_, number) => data.map((part) => part.members[number]).find(Boolean)) });
-    // How far all should be by now.
-    let goal = 0;
+    // How far all should be by now, and milliseconds that the first robots have left to the others.
+    let goal = 0, left = 0;
     await run(clock, signal, () => goal, async (due) => {
       goal = Math.min(until, goal + due);
-      let left = LONGEST;
-      if (first.step < goal) {
-        const steps = goal - first.step, took = await first.advance(steps);
-        clock.took(took, steps);
-        left = clock.speed ? Math.max(0, TICK - took) : Infinity;
+      const steps = goal - first.step, took = steps ? await first.advance(steps) : 0;
+      clock.took(took, steps);
+      if (rest) {
+        left = clock.speed && first.step < until ? Math.min(left + TICK - took, LONGEST + rest.cost) : Infinity;
+        const fit = Math.min(goal - rest.step, Math.floor(Math.min(left, Math.max(LONGEST, rest.cost)) / rest.cost));
+        if (fit > 0) left -= await rest.advance(fit);
       }
-      if (rest && rest.step < goal) await rest.advance(Math.min(goal - rest.step, Math.max(1, Math.floor(left / rest.cost))));
       const { worker, id: counted } = first.shares[0];
       const tally = JSON.parse(await worker.call({ call: "tally", id: counted, moved: merged((part) => part.moved) }));
       const behind = rest && rest.step < first.step ? { robots: rest.numbers.length, step: rest.step } : null;

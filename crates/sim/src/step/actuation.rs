@@ -5,11 +5,12 @@ use crate::physics::Physics;
 use crate::system::System;
 
 /// Returns the target width of an active voxel at a control step \[rest widths\]; `pixel` in [0, 1]
-/// matters to sensors only.
+/// matters to sensors only. Of an actuator it is the target.
 pub(crate) fn target(material: Material, control_step: u64, pixel: f64, physics: &Physics) -> f64 {
     let phase = match material {
         Material::MuscleInPhase => 0.0,
         Material::MuscleAntiphase => physics.antiphase,
+        Material::ActuatorHorizontal | Material::ActuatorVertical => return pixel,
         _ => return width(material, pixel, physics),
     };
     let cycle = u64::from(physics.cycle_steps);
@@ -20,7 +21,7 @@ pub(crate) fn target(material: Material, control_step: u64, pixel: f64, physics:
 }
 
 /// Returns the target width of any voxel under a pixel in [0, 1] \[rest widths\]: for a muscle
-/// halfway through its swing, for a passive voxel 1.
+/// halfway through its swing, for a passive voxel and an actuator 1.
 ///
 /// # Panics
 /// If `target_min` exceeds `target_max` or one is NaN, which [`Physics::validate`] refuses.
@@ -32,6 +33,7 @@ pub fn width(material: Material, pixel: f64, physics: &Physics) -> f64 {
         Material::SensorShrink => physics.sensor_shrink_dark - physics.sensor_swing * pixel,
         Material::SensorExpand => physics.sensor_expand_dark + physics.sensor_swing * pixel,
         Material::Empty | Material::Rigid | Material::Soft => 1.0,
+        Material::ActuatorHorizontal | Material::ActuatorVertical => 1.0,
     };
     free.clamp(physics.target_min, physics.target_max)
 }
@@ -42,7 +44,7 @@ pub(crate) fn set_goals(
     control_step: u64,
     pixels: &[f64],
     targets: &mut [f64],
-    goals: &mut [f64],
+    [goals, vertical]: [&mut [f64]; 2],
 ) {
     let muscles = [Material::MuscleInPhase, Material::MuscleAntiphase]
         .map(|material| target(material, control_step, 0.0, physics));
@@ -53,9 +55,14 @@ pub(crate) fn set_goals(
             sensor => target(sensor, control_step, pixel, physics),
         };
     }
+    let goal = |[first, second]: [usize; 2]| {
+        physics.cell_size * ((targets[first] + targets[second]) / 2.0)
+    };
     for side in &lattice.actuated {
-        let [first, second] = side.voxels;
-        goals[side.goal] = physics.cell_size * ((targets[first] + targets[second]) / 2.0);
+        goals[side.goal] = goal(side.voxels);
+    }
+    for side in &lattice.actuated_vertical {
+        vertical[side.goal] = goal(side.voxels);
     }
 }
 

@@ -2,13 +2,14 @@
 //!
 //! Without them every substep would test all pairs of surface voxels. A list holds every pair whose
 //! boxes come within twice the budget. Until a point has moved by more than the budget, along x or
-//! y, since the lists were made, no other pair can have met. So the lists affect only speed. Motion
-//! along x counts relative to one of the points: the ground is the same everywhere, so walking
-//! alone does not invalidate a list.
+//! y, since the lists were made, no other pair can have met. So the lists affect only speed. On flat
+//! ground, motion along x counts relative to one of the points: it is the same everywhere, so
+//! walking alone does not invalidate a list.
 
 use crate::lattice::{FAMILIES, Lattice, SurfaceVoxel};
 use crate::simd::{BLOCK, Buffer, Lanes, each};
 use crate::state::{Pair, State, X, Y, slices};
+use crate::step::Ground;
 use crate::step::geometry::{Bounds, Vector};
 use crate::step::springs::vectors;
 use crate::system::System;
@@ -103,15 +104,15 @@ impl BroadPhase {
     pub fn refresh<L: Lanes>(
         &mut self,
         system: &System,
+        ground: Ground,
         state: &State,
     ) -> Result<(), UnstableReason> {
         let System { lattice, physics } = system;
         if self.made[X].len() == lattice.len {
             let budget = L::splat(BUDGET * physics.cell_size);
-            let walked = lattice
-                .points
-                .first()
-                .map_or(0.0, |&(p, _)| state.position[X][p] - self.made[X][p]);
+            // A terrain is not the same everywhere.
+            let first = lattice.points.first().filter(|_| ground.terrain.is_none());
+            let walked = first.map_or(0.0, |&(p, _)| state.position[X][p] - self.made[X][p]);
             let mut near = budget.gt(L::splat(0.0));
             for slot in lattice
                 .active_ranges
@@ -129,11 +130,16 @@ impl BroadPhase {
                 return Ok(());
             }
         }
-        self.make::<L>(system, state)
+        self.make::<L>(system, ground, state)
     }
 
     #[inline(always)]
-    fn make<L: Lanes>(&mut self, system: &System, state: &State) -> Result<(), UnstableReason> {
+    fn make<L: Lanes>(
+        &mut self,
+        system: &System,
+        ground: Ground,
+        state: &State,
+    ) -> Result<(), UnstableReason> {
         let System { lattice, physics } = system;
         let slack = 2.0 * BUDGET * physics.cell_size;
         if self.made[X].len() == lattice.len {
@@ -176,10 +182,19 @@ impl BroadPhase {
             if self.candidates.len() > MOST_CANDIDATES * lattice.surface.len() {
                 return Err(UnstableReason::Overlaps);
             }
-            if self.bounds[mover].low.y <= ground_top + slack {
+            let bounds = self.bounds[mover];
+            let may_touch = match ground.terrain {
+                None => bounds.low.y <= ground_top + slack,
+                Some(terrain) => {
+                    let mut is_near = false;
+                    let reach = (physics.cell_size, slack);
+                    terrain.near(&bounds, ground.start_column, reach, |_, _| is_near = true);
+                    is_near
+                }
+            };
+            if may_touch {
                 self.low.push(mover);
             }
-            let bounds = self.bounds[mover];
             for block in (0..lattice.surface.len()).step_by(L::WIDTH) {
                 // Most blocks are far away as a whole.
                 if !self.any_near::<L>(&bounds, block, slack) {

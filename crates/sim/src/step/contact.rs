@@ -1,13 +1,16 @@
 //! Contacts of surface voxels with the ground and with each other (physics.md, "Contacts").
 //!
-//! The ground never moves, so it is not simulated: its cells are computed where a voxel meets it.
+//! The ground never moves, so it is not simulated: flat ground's cells are computed where a voxel
+//! meets it, those of a terrain looked up.
 
 use crate::lattice::{Lattice, SIDES, SurfaceVoxel};
 use crate::physics::{MOST_CELLS, Physics};
 use crate::state::{Pair, State, X, Y};
+use crate::step::Ground;
 use crate::step::broad_phase::{BroadPhase, Candidate, place, quad};
 use crate::step::geometry::{Bounds, Vector, cross, inside};
 use crate::system::System;
+use crate::terrain::Terrain;
 
 /// For each corner (clockwise from the top left), the far ends of the two sides that meet there.
 const FAR_ENDS: [[usize; 2]; 4] = [[1, 3], [0, 2], [3, 1], [2, 0]];
@@ -96,7 +99,7 @@ fn reaction(edge: &Edge, push: &Push, velocity: Vector, physics: &Physics) -> Ve
 
 pub(crate) fn add_contacts(
     System { lattice, physics }: &System,
-    start_column: i64,
+    ground: Ground,
     state: &State,
     broad_phase: &BroadPhase,
     contact: &mut Pair,
@@ -107,8 +110,17 @@ pub(crate) fn add_contacts(
         state,
         contact,
     };
-    for &voxel in &broad_phase.low {
-        contacts.with_ground(&lattice.surface[voxel], start_column);
+    match ground.terrain {
+        None => {
+            for &voxel in &broad_phase.low {
+                contacts.with_ground(&lattice.surface[voxel], ground.start_column);
+            }
+        }
+        Some(terrain) => {
+            for &voxel in &broad_phase.low {
+                contacts.with_terrain(&lattice.surface[voxel], terrain, ground.start_column);
+            }
+        }
     }
     for candidate in &broad_phase.candidates {
         contacts.with_self(*candidate);
@@ -191,33 +203,73 @@ impl Contacts<'_> {
             }
             let ground = [(left, top), (right, top), (right, bottom), (left, bottom)];
             let ground = ground.map(|(x, y)| Vector::new(x, y));
-            let ground_bounds = Bounds {
-                low: ground[3],
-                high: ground[1],
-            };
             let has_peg = start_column
                 .wrapping_add(column)
                 .rem_euclid(i64::from(physics.peg_spacing))
                 == 0;
-            for corner in 0..4 {
-                let far = |quad: &[Vector; 4]| FAR_ENDS[corner].map(|end| quad[end]);
-                let (p, g) = (robot[corner], ground[corner]);
-                if ground_bounds.holds(p, CLEAR) && inside(p, &ground) {
-                    let exposed = [true, false, !has_peg, false];
-                    if let Some(edge) = nearest_edge(p, far(&robot), &ground, &exposed, physics) {
-                        let point = voxel.corners[corner];
-                        let push = push(&edge, self.velocity(point), physics);
-                        self.add(point, push.on_point);
-                    }
-                }
-                if bounds.holds(g, CLEAR)
-                    && inside(g, &robot)
-                    && let Some(edge) =
-                        nearest_edge(g, far(&ground), &robot, &voxel.exposed, physics)
-                {
-                    let push = push(&edge, Vector::ZERO, physics);
-                    self.react(voxel, &edge, &push, 1.0);
-                }
+            self.with_cell(
+                voxel,
+                (&robot, &bounds),
+                &ground,
+                &[true, false, !has_peg, false],
+            );
+        }
+    }
+
+    /// Adds a surface voxel's contacts with every surface cell of a terrain whose box meets its
+    /// own, both ways.
+    fn with_terrain(&mut self, voxel: &SurfaceVoxel, terrain: &Terrain, start_column: i64) {
+        let cell_size = self.physics.cell_size;
+        let robot = quad(voxel, self.state);
+        let bounds = Bounds::of(&robot);
+        terrain.near(&bounds, start_column, (cell_size, 0.0), |column, cell| {
+            let vertex = |column: i64| column as f64 * cell_size;
+            let (left, right) = (vertex(column), vertex(column + 1));
+            let (top, bottom) = (cell.top, cell.bottom);
+            if left > bounds.high.x
+                || right < bounds.low.x
+                || bottom > bounds.high.y
+                || top < bounds.low.y
+            {
+                return;
+            }
+            let ground = [(left, top), (right, top), (right, bottom), (left, bottom)];
+            let ground = ground.map(|(x, y)| Vector::new(x, y));
+            self.with_cell(voxel, (&robot, &bounds), &ground, &cell.exposed);
+        });
+    }
+
+    /// Adds a surface voxel's contacts with a cell of the ground, both ways.
+    #[inline(always)]
+    fn with_cell(
+        &mut self,
+        voxel: &SurfaceVoxel,
+        (robot, bounds): (&[Vector; 4], &Bounds),
+        ground: &[Vector; 4],
+        exposed: &[bool; 4],
+    ) {
+        let physics = self.physics;
+        let ground_bounds = Bounds {
+            low: ground[3],
+            high: ground[1],
+        };
+        for corner in 0..4 {
+            let far = |quad: &[Vector; 4]| FAR_ENDS[corner].map(|end| quad[end]);
+            let (p, g) = (robot[corner], ground[corner]);
+            if ground_bounds.holds(p, CLEAR)
+                && inside(p, ground)
+                && let Some(edge) = nearest_edge(p, far(robot), ground, exposed, physics)
+            {
+                let point = voxel.corners[corner];
+                let push = push(&edge, self.velocity(point), physics);
+                self.add(point, push.on_point);
+            }
+            if bounds.holds(g, CLEAR)
+                && inside(g, robot)
+                && let Some(edge) = nearest_edge(g, far(ground), robot, &voxel.exposed, physics)
+            {
+                let push = push(&edge, Vector::ZERO, physics);
+                self.react(voxel, &edge, &push, 1.0);
             }
         }
     }

@@ -3,7 +3,7 @@
 pub(crate) mod actuation;
 pub(crate) mod broad_phase;
 mod contact;
-mod geometry;
+pub(crate) mod geometry;
 pub(crate) mod limits;
 pub(crate) mod off_lattice;
 mod rk4;
@@ -16,13 +16,23 @@ use crate::simd::{Kernel, Lanes};
 use crate::state::State;
 use crate::stop::{Stopped, check};
 use crate::system::System;
+use crate::terrain::Terrain;
 use crate::unstable::UnstableReason;
 use std::sync::atomic::AtomicBool;
+
+/// What a robot stands on, and where.
+#[derive(Clone, Copy)]
+pub(crate) struct Ground<'a> {
+    /// `None` is flat ground.
+    pub terrain: Option<&'a Terrain>,
+    /// Column of the body's left edge, where local x is 0.
+    pub start_column: i64,
+}
 
 /// The substeps of a control step.
 pub(crate) struct ControlStep<'a> {
     pub system: &'a System,
-    pub start_column: i64,
+    pub ground: Ground<'a>,
     pub state: &'a mut State,
     pub scratch: &'a mut Scratch,
     pub meter: Option<&'a mut Meter>,
@@ -42,7 +52,7 @@ impl Kernel for ControlStep<'_> {
     fn run<L: Lanes>(self) -> Self::Output {
         let ControlStep {
             system,
-            start_column,
+            ground,
             state,
             scratch,
             mut meter,
@@ -50,7 +60,7 @@ impl Kernel for ControlStep<'_> {
         } = self;
         for _ in 0..system.physics.substeps {
             check(stop).map_err(|Stopped| Ended::Stopped)?;
-            substep::<L>(system, start_column, state, scratch, meter.as_deref_mut())
+            substep::<L>(system, ground, state, scratch, meter.as_deref_mut())
                 .map_err(Ended::Unstable)?;
         }
         Ok(())
@@ -60,12 +70,12 @@ impl Kernel for ControlStep<'_> {
 #[inline(always)]
 fn substep<L: Lanes>(
     system: &System,
-    start_column: i64,
+    ground: Ground,
     state: &mut State,
     scratch: &mut Scratch,
     mut meter: Option<&mut Meter>,
 ) -> Result<(), UnstableReason> {
-    before_rigid::<L>(system, start_column, state, scratch, meter.as_deref_mut())?;
+    before_rigid::<L>(system, ground, state, scratch, meter.as_deref_mut())?;
     limits::limit_rigid(system, &mut state.position);
     meter
         .iter_mut()
@@ -77,19 +87,19 @@ fn substep<L: Lanes>(
 #[inline(always)]
 pub(crate) fn before_rigid<L: Lanes>(
     system: &System,
-    start_column: i64,
+    ground: Ground,
     state: &mut State,
     scratch: &mut Scratch,
     mut meter: Option<&mut Meter>,
 ) -> Result<(), UnstableReason> {
-    scratch.broad_phase.refresh::<L>(system, state)?;
+    scratch.broad_phase.refresh::<L>(system, ground, state)?;
     if scratch.broad_phase.too_many_overlaps(system, state) {
         return Err(UnstableReason::Overlaps);
     }
     scratch.contact.iter_mut().for_each(|axis| axis.fill(0.0));
     contact::add_contacts(
         system,
-        start_column,
+        ground,
         state,
         &scratch.broad_phase,
         &mut scratch.contact,

@@ -26,8 +26,15 @@ pub(crate) fn integrate<L: Lanes>(system: &System, state: &mut State, scratch: &
     }
     // The first substep of a control step has no lengths yet.
     let anew = std::mem::take(&mut scratch.anew);
-    if anew || !first_stage::<L, false>(system, state, scratch) {
-        first_stage::<L, true>(system, state, scratch);
+    let is_regular = |scratch: &mut Scratch| match lattice.actuated_vertical.is_empty() {
+        true => first_stage::<L, false, false>(system, state, scratch),
+        false => first_stage::<L, false, true>(system, state, scratch),
+    };
+    if anew || !is_regular(scratch) {
+        match lattice.actuated_vertical.is_empty() {
+            true => first_stage::<L, true, false>(system, state, scratch),
+            false => first_stage::<L, true, true>(system, state, scratch),
+        };
     }
     if !later_stages::<L, false>(system, state, scratch) {
         later_stages::<L, true>(system, state, scratch);
@@ -88,10 +95,10 @@ fn load_of<L: Lanes>(work: &Work, off_lattice: Option<&OffLattice>, slot: usize)
     each!(axis in [X, Y] => of[axis] + L::load(&off_lattice.load[axis], slot))
 }
 
-/// Runs the first stage: the load without springs, the springs' rest lengths, and the second
+/// Runs the first stage, with goals of vertical springs if `VERTICAL`: the load without springs, the springs' rest lengths, and the second
 /// stage's positions. Returns true if all was regular.
 #[inline(always)]
-fn first_stage<L: Lanes, const EXACT: bool>(
+fn first_stage<L: Lanes, const EXACT: bool, const VERTICAL: bool>(
     System { lattice, physics }: &System,
     state: &State,
     scratch: &mut Scratch,
@@ -100,6 +107,7 @@ fn first_stage<L: Lanes, const EXACT: bool>(
     let Scratch {
         springs,
         goals,
+        vertical_goals,
         carry,
         work,
         off_lattice,
@@ -123,7 +131,11 @@ fn first_stage<L: Lanes, const EXACT: bool>(
         let mut gather = Gather::<L>::new([&mut *px, &mut *py], pitch);
         for slot in range.clone().step_by(L::WIDTH) {
             let (work, lane) = (&mut work[slot / BLOCK], slot % BLOCK);
-            let goal = [L::load(goals, slot), straight, diagonal, diagonal];
+            let upright = match VERTICAL {
+                true => L::load(vertical_goals, slot),
+                false => straight,
+            };
+            let goal = [L::load(goals, slot), upright, diagonal, diagonal];
             let vectors = vectors(position, slot, pitch);
             let springs = &mut springs[slot / BLOCK];
             let square = squares(&vectors);
