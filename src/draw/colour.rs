@@ -85,15 +85,20 @@ pub(crate) fn tones(material: Material) -> [[u8; 3]; 3] {
         Material::Empty => [[255, 255, 255]; 3],
         Material::Rigid => [[6, 6, 8], [42, 43, 47], [78, 80, 85]],
         Material::Soft => [[150, 152, 157], [186, 188, 193], [232, 234, 238]],
-        Material::MuscleInPhase => [[136, 78, 4], [240, 152, 36], [255, 214, 150]],
-        Material::MuscleAntiphase => [[38, 96, 140], [110, 184, 232], [204, 233, 250]],
+        Material::MuscleInPhase | Material::ActuatorHorizontal => {
+            [[136, 78, 4], [240, 152, 36], [255, 214, 150]]
+        }
+        Material::MuscleAntiphase | Material::ActuatorVertical => {
+            [[38, 96, 140], [110, 184, 232], [204, 233, 250]]
+        }
         Material::SensorShrink => [[96, 8, 26], [200, 36, 58], [240, 138, 148]],
         Material::SensorExpand => [[4, 74, 46], [26, 152, 98], [134, 214, 176]],
     }
 }
 
 /// Returns the lines that mark a material on large voxels, from −½ to ½, x to the right, y up:
-/// chevrons up and down for muscles, plus and minus for sensors. Colours alone cannot keep six
+/// chevrons up and down for muscles, plus and minus for sensors, and for actuators two chevrons
+/// outwards, whose colours are those of muscles. Colours alone cannot keep six
 /// materials apart at every shade for colour-blind viewers.
 pub(crate) fn mark(material: Material) -> &'static [&'static [[f64; 2]]] {
     match material {
@@ -102,6 +107,14 @@ pub(crate) fn mark(material: Material) -> &'static [&'static [[f64; 2]]] {
         Material::MuscleAntiphase => &[&[[-0.2, 0.1], [0.0, -0.12], [0.2, 0.1]]],
         Material::SensorShrink => &[&[[-0.2, 0.0], [0.2, 0.0]]],
         Material::SensorExpand => &[&[[-0.2, 0.0], [0.2, 0.0]], &[[0.0, -0.2], [0.0, 0.2]]],
+        Material::ActuatorHorizontal => &[
+            &[[-0.08, -0.12], [-0.2, 0.0], [-0.08, 0.12]],
+            &[[0.08, -0.12], [0.2, 0.0], [0.08, 0.12]],
+        ],
+        Material::ActuatorVertical => &[
+            &[[-0.12, -0.08], [0.0, -0.2], [0.12, -0.08]],
+            &[[-0.12, 0.08], [0.0, 0.2], [0.12, 0.08]],
+        ],
     }
 }
 

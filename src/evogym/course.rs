@@ -5,7 +5,7 @@ use crate::body::Body;
 use crate::evogym::sense::Sight;
 use crate::evogym::tasks::Task;
 use crate::evogym::worlds::{Object, objects};
-use crate::sim::Terrain;
+use crate::sim::{Physics, Terrain, TerrainObject};
 use std::sync::Arc;
 
 /// A task with its ground; any number of robots share it.
@@ -24,7 +24,9 @@ impl Course {
     /// Returns an error if the simulator refuses the ground.
     pub fn new(task: &'static Task) -> Result<Self, Error> {
         let objects = objects(task.world);
-        let terrain = terrain(&objects)?;
+        let solid: Vec<TerrainObject> = objects.iter().map(Object::solid).collect();
+        let terrain = Terrain::new(&solid, Physics::default().cell_size)
+            .map_err(|error| Error::other(format!("{}: {error}", task.world)))?;
         Ok(Course {
             task,
             terrain: Arc::new(terrain),
@@ -65,8 +67,4 @@ impl Course {
             ))),
         }
     }
-}
-
-fn terrain(_objects: &[Object]) -> Result<Terrain, Error> {
-    Ok(Terrain)
 }

@@ -44,8 +44,7 @@ pub fn body(voxels: &Grid<u8>) -> Result<Body, Error> {
 /// actions.
 pub fn actuators(body: &Body) -> impl Iterator<Item = usize> + '_ {
     let cells = body.voxels().cells().iter().enumerate();
-    let actuators = [Material::ActuatorHorizontal, Material::ActuatorVertical];
     cells
-        .filter(move |(_, material)| actuators.contains(material))
+        .filter(|(_, material)| material.is_actuator())
         .map(|(place, _)| place)
 }

@@ -1,5 +1,8 @@
 //! The fixed objects of EvoGym's worlds.
 
+use crate::base::Grid;
+use crate::sim::TerrainObject;
+
 /// All worlds: `world` and its name, then for each object `object`, its name, its lowest left column
 /// and row, and its rows from the top, `#` a fixed cell.
 const TEXT: &str = include_str!("worlds.txt");
@@ -10,7 +13,7 @@ pub struct Object {
     /// Its name, as of EvoGym's files.
     pub name: &'static str,
     /// Column of its lower left cell.
-    pub column: i64,
+    pub column: u32,
     /// Row of its lower left cell, 0 at the bottom.
     pub row: u32,
     /// Its cells, rows from the top; true where one is fixed.
@@ -24,8 +27,20 @@ impl Object {
         let rows = (0_i64..).zip(&self.cells);
         rows.flat_map(move |(down, row)| {
             let filled = (0_i64..).zip(row).filter(|(_, cell)| **cell);
-            filled.map(move |(right, _)| (self.column + right, top - down))
+            filled.map(move |(right, _)| (i64::from(self.column) + right, top - down))
         })
+    }
+
+    /// Returns it as the simulator has it.
+    pub(crate) fn solid(&self) -> TerrainObject {
+        let width = self.cells.first().map_or(0, Vec::len);
+        TerrainObject {
+            column: self.column,
+            row: self.row,
+            cells: Grid::from_fn(self.cells.len(), width, |row, column| {
+                self.cells[row].get(column) == Some(&true)
+            }),
+        }
     }
 
     /// Returns its corners (right, down) from the top left of its box, each once, in EvoGym's order
@@ -65,7 +80,7 @@ impl Object {
     pub(crate) fn place(&self, (right, down): (usize, usize)) -> [f64; 2] {
         let height = self.cells.len() as f64;
         [
-            self.column as f64 * 0.1 + right as f64 * 0.1,
+            f64::from(self.column) * 0.1 + right as f64 * 0.1,
             (f64::from(self.row) * 0.1 + height * 0.1) - down as f64 * 0.1,
         ]
     }
@@ -113,7 +128,7 @@ mod tests {
             let words: Vec<_> = line.split(' ').collect();
             let is_known = match words[0] {
                 "world" => words.len() == 2,
-                "object" => words[2].parse::<i64>().is_ok() && words[3].parse::<u32>().is_ok(),
+                "object" => words[2].parse::<u32>().is_ok() && words[3].parse::<u32>().is_ok(),
                 row => row.bytes().all(|cell| b"#.".contains(&cell)),
             };
             assert!(is_known, "{line}");

@@ -264,6 +264,8 @@ fn letter(pixel: Pixel) -> char {
         Pixel::Voxel(Material::Rigid, _) => '#',
         Pixel::Voxel(Material::MuscleInPhase, _) => '/',
         Pixel::Voxel(Material::MuscleAntiphase, _) => '\\',
+        Pixel::Voxel(Material::ActuatorHorizontal, _) => '<',
+        Pixel::Voxel(Material::ActuatorVertical, _) => '^',
         Pixel::Voxel(Material::SensorShrink, _) => '-',
         Pixel::Voxel(Material::SensorExpand, _) => '+',
         Pixel::Voxel(Material::Soft | Material::Empty, _) => ':',
