@@ -167,7 +167,8 @@ impl Terrain {
     }
 
     fn index(&self, column: i64, row: i64) -> Option<usize> {
-        let (column, row) = (column - self.origin.0, row - self.origin.1);
+        let column = column.checked_sub(self.origin.0)?;
+        let row = row.checked_sub(self.origin.1)?;
         let inside =
             (0..self.columns as i64).contains(&column) && (0..self.rows as i64).contains(&row);
         inside.then(|| row as usize * self.columns + column as usize)

@@ -6,8 +6,9 @@ use crate::step::limits::{SharedRigidPass, limit_rigid};
 use crate::step::{Ended, Ground, before_rigid};
 use crate::stop::{NEVER, Stopped, check};
 use crate::system::System;
+use crate::terrain::Terrain;
 use crate::unstable::{Unstable, UnstableReason};
-use crate::world::{Start, World};
+use crate::world::{Start, StartError, TargetsError, World};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -34,7 +35,25 @@ impl Worlds {
 
     /// Makes this many robots at rest, at least one and at most [`Worlds::MOST`], all pixels dark.
     pub fn new(system: impl Into<Arc<System>>, start: Start, count: usize) -> Self {
-        let first = World::new(system, start);
+        Worlds::of(World::new(system, start), count)
+    }
+
+    /// Makes this many robots at rest on a terrain (see [`World::on_terrain`]), at least one and at
+    /// most [`Worlds::MOST`].
+    ///
+    /// # Errors
+    /// Returns a [`StartError`] if the robot's box overlaps a fixed cell.
+    pub fn on_terrain(
+        system: impl Into<Arc<System>>,
+        start: Start,
+        terrain: impl Into<Arc<Terrain>>,
+        count: usize,
+    ) -> Result<Self, StartError> {
+        let first = World::on_terrain(system, start, terrain)?;
+        Ok(Worlds::of(first, count))
+    }
+
+    fn of(first: World, count: usize) -> Self {
         let count = count.clamp(1, Worlds::MOST);
         let rigid = SharedRigidPass::new(&first.system.lattice);
         Worlds {
@@ -61,6 +80,14 @@ impl Worlds {
     /// Sets the image of one of them (see [`World::set_stimulus`]).
     pub fn set_stimulus(&mut self, number: usize, stimulus: &Grid<f64>) {
         self.worlds[number].set_stimulus(stimulus);
+    }
+
+    /// Sets the actuators' targets of one of them (see [`World::set_targets`]).
+    ///
+    /// # Errors
+    /// Returns a [`TargetsError`], and changes nothing, for a wrong count or NaN.
+    pub fn set_targets(&mut self, number: usize, targets: &[f64]) -> Result<(), TargetsError> {
+        self.worlds[number].set_targets(targets)
     }
 
     /// Returns how each became unstable, if it did: it steps no more, and its state is useless.
