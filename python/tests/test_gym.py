@@ -65,11 +65,25 @@ def test_rewards_and_observations_of_whole_episodes_are_evogyms(episode):
         assert not terminated and not truncated
         rewards.append(reward)
         seen[t + 1] = observation
-    assert np.abs(np.array(rewards) - episode["rewards"]).max() < 1e-9
+    settled = SENSITIVE_FROM.get(EPISODES.index(episode), len(rewards))
+    assert np.abs(np.array(rewards) - episode["rewards"])[:settled].max() < 1e-9
     for step, expected in zip(episode["observation_steps"], episode["observations"], strict=True):
-        assert np.abs(seen[step] - expected).max() < 1e-6, step
+        assert step > settled or np.abs(seen[step] - expected).max() < 1e-6, step
 
 
+def test_the_episode_that_is_not_followed_to_its_end_depends_on_rounding():
+    for number, step in SENSITIVE_FROM.items():
+        episode, found = EPISODES[number], []
+        for change in (0, 1e-15, 1e-14):
+            env = make(episode["task"], episode["body"], start=(episode["robot_x"], episode["robot_y"]))
+            env.reset()
+            found.append([env.step(row + change)[1] for row in waves(200, episode["actuators"], 1.7)])
+        different = np.abs(np.array(found[1:]) - found[0]).max(axis=0)
+        assert different[:step].max() < 1e-11 and different[step:].max() > 1e-9
+
+
+#: Contacts that the last bit decides: from this step on, changing the actions by 1e-14 changes rewards by over 1e-9.
+SENSITIVE_FROM = {29: 180}
 #: EvoGym draws goals without a seed; its rewards say which they were.
 WALKERS = [episode for episode in EPISODES if episode["task"] == "BidirectionalWalker-v0"]
 GOALS_OF = dict(zip(map(id, WALKERS), ([28], [38, 23]), strict=True))
