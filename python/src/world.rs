@@ -68,7 +68,7 @@ impl WorldData {
         }
         let origin = match terrain {
             None => [0.0, -f64::from(physics.ground_row)],
-            Some(_) => [start.column as f64, 0.0],
+            Some(_) => [0.0, 0.0],
         };
         let system = System::new(&body, physics);
         let world = match terrain {

@@ -265,7 +265,7 @@ impl Scenario {
     fn origin(&self) -> [f64; 2] {
         match self.terrain {
             None => [0.0, -f64::from(self.physics.ground_row)],
-            Some(_) => [self.start().column as f64, 0.0],
+            Some(_) => [0.0, 0.0],
         }
     }
 

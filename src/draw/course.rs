@@ -1,16 +1,14 @@
 //! Pictures of a robot at one of EvoGym's tasks.
 
 use crate::base::Grid;
-use crate::draw::colour::{GRID, GROUND, GROUND_LINE, PAPER};
+use crate::draw::colour::GRID;
 use crate::draw::error::PictureError;
 use crate::draw::raster;
-use crate::draw::scene::{Look, Primitive, Window, body, ruler};
+use crate::draw::scene::{Look, Primitive, Window, body, ruler, terrain};
 use crate::draw::walk::Walk;
 use crate::evogym::environment::Environment;
-use crate::evogym::worlds::Object;
 use crate::task::class_names::ClassNames;
 use crate::task::recording::{Frame, LabelledStimulus, Phase, Recording, VoxelCorners};
-use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 use tiny_skia::Pixmap;
 
@@ -67,8 +65,8 @@ pub fn picture(environment: &Environment, view: &View) -> Result<Vec<u8>, Pictur
         grid(&window, &mut scene);
     }
     if view.background {
-        for object in environment.course().objects() {
-            ground(object, view.edges, &window, &mut scene);
+        for object in environment.course().terrain.objects() {
+            terrain(object, &window, view.edges, &mut scene);
         }
     }
     if view.robot {
@@ -95,43 +93,6 @@ fn grid(window: &Window, scene: &mut Vec<Primitive>) {
     scene.extend(columns.map(|x| line([[x, window.bottom], [x, window.top]])));
     let rows = window.bottom.ceil() as i64..=window.top.floor() as i64;
     scene.extend(rows.map(|y| line([[window.left, y as f64], [window.right, y as f64]])));
-}
-
-fn ground(object: &Object, edges: bool, window: &Window, scene: &mut Vec<Primitive>) {
-    let filled: BTreeSet<(i64, i64)> = object.filled().collect();
-    let is_seen = |(x, y): &(i64, i64)| {
-        let [x, y] = [*x as f64, *y as f64];
-        x + 1.0 > window.left && x < window.right && y + 1.0 > window.bottom && y < window.top
-    };
-    for &(x, y) in filled.iter().filter(|cell| is_seen(cell)) {
-        let [left, bottom] = [x as f64, y as f64];
-        let (right, top) = (left + 1.0, bottom + 1.0);
-        scene.push(Primitive::rectangle([left, top], [right, bottom], GROUND));
-        if window.scale >= FINE {
-            let corners = [[right, top], [right, bottom], [left, bottom]];
-            scene.push(Primitive::Line {
-                points: corners.to_vec(),
-                width: 1.0,
-                colour: PAPER,
-                smooth: false,
-            });
-        }
-    }
-    if !edges {
-        return;
-    }
-    for &(x, y) in filled.iter().filter(|cell| is_seen(cell)) {
-        let [left, bottom] = [x as f64, y as f64];
-        let (right, top) = (left + 1.0, bottom + 1.0);
-        let sides = [
-            ((x, y + 1), [[left, top], [right, top]]),
-            ((x + 1, y), [[right, top], [right, bottom]]),
-            ((x, y - 1), [[left, bottom], [right, bottom]]),
-            ((x - 1, y), [[left, top], [left, bottom]]),
-        ];
-        let open = sides.iter().filter(|(across, _)| !filled.contains(across));
-        scene.extend(open.map(|(_, [from, to])| Primitive::line(*from, *to, 1.5, GROUND_LINE)));
-    }
 }
 
 /// Returns the present moment as a recording, in voxel lengths from the world's corner.
@@ -167,6 +128,7 @@ fn moment(environment: &Environment) -> Recording {
         every: 1,
         cycle: 50,
         unstable: false,
+        terrain: None,
         judge: None,
         names: ClassNames::default(),
     }
@@ -176,7 +138,7 @@ fn moment(environment: &Environment) -> Recording {
 mod tests {
     use super::*;
     use crate::body::Material;
-    use crate::draw::colour::shade;
+    use crate::draw::colour::{GROUND, PAPER, shade};
     use crate::evogym::{course::Course, robot, tasks};
     use std::sync::Arc;
 

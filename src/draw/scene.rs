@@ -132,7 +132,7 @@ pub(crate) fn world(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive
     let mut out = ground(walk, frame, window);
     let objects = walk.recording().terrain.iter();
     for object in objects.flat_map(|terrain| terrain.objects()) {
-        terrain(object, window, &mut out);
+        terrain(object, window, true, &mut out);
     }
     out.extend(body(walk, frame, window));
     out.extend(path(walk, frame, window));
@@ -185,8 +185,13 @@ fn ground(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
     out
 }
 
-/// Draws the fixed cells of an object with its outline.
-pub(crate) fn terrain(object: &TerrainObject, window: &Window, out: &mut Vec<Primitive>) {
+/// Draws the fixed cells of an object, with its outline if asked for.
+pub(crate) fn terrain(
+    object: &TerrainObject,
+    window: &Window,
+    outlined: bool,
+    out: &mut Vec<Primitive>,
+) {
     let line = |points: &[[f64; 2]], width, colour| Primitive::Line {
         points: points.to_vec(),
         width,
@@ -228,8 +233,8 @@ pub(crate) fn terrain(object: &TerrainObject, window: &Window, out: &mut Vec<Pri
             ] {
                 match is_fixed(beside) {
                     true if window.scale >= MARKED => sides.push(line(&side, 1.0, seams)),
-                    true => {}
-                    false => sides.push(line(&side, 1.5, outline)),
+                    false if outlined => sides.push(line(&side, 1.5, outline)),
+                    _ => {}
                 }
             }
         }

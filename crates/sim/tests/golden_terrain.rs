@@ -26,7 +26,7 @@ fn compared(reference: &TerrainReference, until: u64) -> (f64, Option<u64>) {
             return (worst, Some(unstable.control_step));
         }
         let away = |ours: [f64; 2], theirs: [f64; 2]| {
-            let x = ours[0] * 10.0 + reference.start_column as f64 - theirs[0];
+            let x = ours[0] * 10.0 - theirs[0];
             let y = ours[1] * 10.0 - theirs[1];
             x.abs().max(y.abs())
         };
