@@ -19,6 +19,7 @@
 //! | 2 | [`baseline`] | networks that robots are compared with | [`baseline::train`] |
 //! | 2 | [`data`] | datasets: IDX files, imports, drawn digits | [`data::dataset::Dataset`] |
 //! | 3 | [`task`] | stimuli, protocols, rollouts, answers and scores | [`task::evaluation`] |
+//! | 3 | [`evogym`] | EvoGym's tasks: worlds, observations, rewards, ends | [`evogym::environment::Environments`] |
 //! | 4 | [`response`] | how a gait responds, and what training could reach with it | [`response::gait::Gait`] |
 //! | 5 | [`config`] | everything a run depends on; errors with line and key | [`config::Config`] |
 //! | 6 | [`store`] | the files of a run's folder as plain data | [`store::run::RunFile`] |
@@ -154,6 +155,7 @@ pub mod config;
 pub mod data;
 #[cfg(feature = "figures")]
 pub mod draw;
+pub mod evogym;
 pub mod genome;
 pub mod images;
 pub mod qd;

@@ -10,6 +10,7 @@ mod pictures;
 mod remedies;
 mod rollouts;
 mod run;
+mod tasks;
 mod watch;
 mod world;
 
@@ -40,6 +41,7 @@ fn _morphcog(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<pictures::FigureData>()?;
     module.add_class::<pictures::RecordingData>()?;
     module.add_class::<run::RunData>()?;
+    module.add_class::<tasks::TasksData>()?;
     module.add_class::<world::WorldData>()?;
     module.add_function(wrap_pyfunction!(commands::evolve_run, module)?)?;
     module.add_function(wrap_pyfunction!(commands::train_run, module)?)?;
@@ -51,6 +53,9 @@ fn _morphcog(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(rollouts::displacements, module)?)?;
     module.add_function(wrap_pyfunction!(rollouts::rollouts, module)?)?;
     module.add_function(wrap_pyfunction!(run::runs, module)?)?;
+    module.add_function(wrap_pyfunction!(tasks::tasks, module)?)?;
+    module.add_function(wrap_pyfunction!(tasks::task_steps, module)?)?;
+    module.add_function(wrap_pyfunction!(tasks::returns, module)?)?;
     module.add_function(wrap_pyfunction!(command, module)?)?;
     Ok(())
 }

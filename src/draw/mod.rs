@@ -6,6 +6,7 @@
 //! build on these. Figures for print are vectors, in [`plot`]; `serve` has its own page, over HTTP.
 
 pub(crate) mod colour;
+pub mod course;
 pub(crate) mod error;
 pub mod film;
 pub(crate) mod fonts;

@@ -277,7 +277,8 @@ fn grid(window: &Window, out: &mut Vec<Primitive>) {
     out.extend(before.chain(ruler(window, 0.0, step)).map(peg));
 }
 
-fn body(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
+/// Draws the voxels of a frame with their marks, seams and outline.
+pub(crate) fn body(walk: &Walk, frame: usize, window: &Window) -> Vec<Primitive> {
     let smooth = !window.crisp;
     let voxels = || {
         walk.voxels(frame)

@@ -10,7 +10,7 @@ use syn::{Attribute, Item};
 /// Modules with their layers, the one table of them (`src/lib.rs` explains it). A module uses only
 /// modules of lower layers. The simulator is a crate of its own, of which `base` and `body` pass on
 /// what does not simulate.
-const LAYERS: [(&str, u8); 21] = [
+const LAYERS: [(&str, u8); 22] = [
     ("base", 0),
     ("shipped", 1),
     ("body", 1),
@@ -20,6 +20,7 @@ const LAYERS: [(&str, u8); 21] = [
     ("baseline", 2),
     ("data", 2),
     ("task", 3),
+    ("evogym", 3),
     ("response", 4),
     ("config", 5),
     ("store", 6),

@@ -118,7 +118,7 @@ pub(crate) fn add_contacts(
         }
         Some(terrain) => {
             for &voxel in &broad_phase.low {
-                contacts.with_terrain(&lattice.surface[voxel], terrain, ground.start_column);
+                contacts.with_terrain(&lattice.surface[voxel], terrain);
             }
         }
     }
@@ -218,13 +218,12 @@ impl Contacts<'_> {
 
     /// Adds a surface voxel's contacts with every surface cell of a terrain whose box meets its
     /// own, both ways.
-    fn with_terrain(&mut self, voxel: &SurfaceVoxel, terrain: &Terrain, start_column: i64) {
+    fn with_terrain(&mut self, voxel: &SurfaceVoxel, terrain: &Terrain) {
         let cell_size = self.physics.cell_size;
         let robot = quad(voxel, self.state);
         let bounds = Bounds::of(&robot);
-        terrain.near(&bounds, start_column, (cell_size, 0.0), |column, cell| {
-            let vertex = |column: i64| column as f64 * cell_size;
-            let (left, right) = (vertex(column), vertex(column + 1));
+        terrain.near(&bounds, (cell_size, 0.0), |cell| {
+            let (left, right) = (cell.left, cell.right);
             let (top, bottom) = (cell.top, cell.bottom);
             if left > bounds.high.x
                 || right < bounds.low.x
