@@ -83,8 +83,10 @@ def measured(what, bodies):
 def processor():
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as file:
-            return next(line.split(":")[1].strip() for line in file if line.startswith("model name"))
-    except (OSError, StopIteration):
+            about = dict(line.split(":", 1) for line in file.read().split("\n\n")[0].splitlines())
+        about = {key.strip(): value.strip() for key, value in about.items()}
+        return f"{about['model name']} (family {about['cpu family']})"
+    except (OSError, KeyError, ValueError):
         return platform.processor() or platform.machine()
 
 

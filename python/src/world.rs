@@ -8,7 +8,7 @@ use crate::watch::check_interrupt;
 use morphcog::body::Body;
 use morphcog::sim::{FloatEnvironment, Start, System};
 use morphcog::task::protocol::MAX_ROW;
-use morphcog::task::rollout::{moment, place_from};
+use morphcog::task::rollout::{moment, place_in};
 use morphcog::task::terrain::{FixedObject, built, placed};
 use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -29,8 +29,6 @@ pub(crate) struct WorldData {
 struct Simulation {
     world: morphcog::sim::World,
     unstable: Option<String>,
-    /// Where positions count from \[voxel lengths\].
-    origin: [f64; 2],
 }
 
 #[pymethods]
@@ -66,10 +64,6 @@ impl WorldData {
                 start.row
             )));
         }
-        let origin = match terrain {
-            None => [0.0, -f64::from(physics.ground_row)],
-            Some(_) => [0.0, 0.0],
-        };
         let system = System::new(&body, physics);
         let world = match terrain {
             None => morphcog::sim::World::new(system, start),
@@ -87,7 +81,6 @@ impl WorldData {
             simulation: Mutex::new(Simulation {
                 world,
                 unstable: None,
-                origin,
             }),
             body,
         })
@@ -107,7 +100,7 @@ impl WorldData {
         let stimulus = seen(pixels.as_array(), &self.body)?;
         let simulation = self.simulation(py);
         let world = &simulation.world;
-        let recording = moment(world, &self.body, stimulus, simulation.origin);
+        let recording = moment(world, &self.body, stimulus);
         Ok(RecordingData::new(recording))
     }
 
@@ -232,8 +225,8 @@ impl Simulation {
         stepped
     }
 
-    /// Converts a position to voxel lengths from the origin.
+    /// Converts a position to voxel lengths.
     fn lengths(&self, at: [f64; 2]) -> [f64; 2] {
-        place_from(at, self.world.system().physics(), self.origin)
+        place_in(&self.world, at)
     }
 }

@@ -14,8 +14,8 @@ use crate::sim::{Physics, Start, StepError, System, World};
 use crate::store::folder;
 use crate::task::class_names::ClassNames;
 use crate::task::protocol::{MAX_COLUMN, MAX_ROW, MAX_STEPS};
-use crate::task::recording::{Frame, LabelledStimulus, Phase, Recording};
-use crate::task::rollout::{MOST_PLACES, frame_from, place_from, voxels};
+use crate::task::recording::{LabelledStimulus, Phase, Recording};
+use crate::task::rollout::{MOST_PLACES, frame, place_in, voxels};
 use crate::task::terrain::{self, FixedObject, at_most_a_thousand};
 use schemars::JsonSchema;
 use serde::de::{Error as _, SeqAccess, Visitor};
@@ -260,15 +260,6 @@ impl Scenario {
         }
     }
 
-    /// Returns where positions count from \[voxel lengths\]: the body's left edge and the ground, or
-    /// on terrain column 0 and row 0.
-    fn origin(&self) -> [f64; 2] {
-        match self.terrain {
-            None => [0.0, -f64::from(self.physics.ground_row)],
-            Some(_) => [0.0, 0.0],
-        }
-    }
-
     /// Returns the row and column of each actuator, row-major.
     fn actuators(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         let voxels = self.body.voxels().iter();
@@ -381,14 +372,6 @@ impl<'a> Simulation<'a> {
         self.step += 1;
         Ok(())
     }
-
-    fn lengths(&self, at: [f64; 2]) -> [f64; 2] {
-        place_from(at, &self.scenario.physics, self.scenario.origin())
-    }
-
-    fn frame(&self) -> Frame {
-        frame_from(&self.world, self.scenario.origin())
-    }
 }
 
 /// Simulates the scenario and passes the CSV to `line`, line by line: `step,com_x,com_y`, then the
@@ -417,7 +400,7 @@ pub fn simulate(
     }
     line(header + "\n")?;
     let mut row = |simulation: &Simulation| {
-        let lengths = |at: [f64; 2]| simulation.lengths(at).map(digits17);
+        let lengths = |at: [f64; 2]| place_in(&simulation.world, at).map(digits17);
         let [x, y] = lengths(simulation.world.centre_of_mass());
         let mut text = format!("{},{x},{y}", simulation.step);
         if points {
@@ -457,7 +440,7 @@ pub(crate) fn record(
             "control_steps: {steps} in all, expected at most {most} for pictures"
         )));
     }
-    let start = simulation.frame();
+    let start = frame(&simulation.world);
     let mut recording = Recording {
         robot: name.to_string(),
         body: scenario.body.clone(),
@@ -486,7 +469,7 @@ pub(crate) fn record(
         }
         outcome = simulation.step(stop);
         match &outcome {
-            Ok(()) => recording.frames.push(simulation.frame()),
+            Ok(()) => recording.frames.push(frame(&simulation.world)),
             Err(error) if error.kind == ErrorKind::Unstable => {
                 recording.unstable = true;
                 break;

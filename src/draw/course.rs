@@ -110,6 +110,7 @@ fn moment(environment: &Environment) -> Recording {
     Recording {
         robot: String::new(),
         body: body.clone(),
+        terrain: None,
         voxels: environment.voxels().map(voxel).collect(),
         phases: vec![Phase {
             first_frame: 0,

@@ -28,12 +28,14 @@ pub fn place([x, y]: [f64; 2], physics: &Physics) -> [f64; 2] {
     ]
 }
 
-/// Acts as [`place`] for positions from another origin, added to them \[voxel lengths\].
-pub fn place_from([x, y]: [f64; 2], physics: &Physics, origin: [f64; 2]) -> [f64; 2] {
-    [
-        voxel_lengths(x, physics) + origin[0],
-        voxel_lengths(y, physics) + origin[1],
-    ]
+/// Converts a position in a world to voxel lengths, with y from the flat ground, or from row 0 on
+/// terrain.
+pub fn place_in(world: &World, [x, y]: [f64; 2]) -> [f64; 2] {
+    let physics = world.system().physics();
+    match world.terrain() {
+        None => place([x, y], physics),
+        Some(_) => [voxel_lengths(x, physics), voxel_lengths(y, physics)],
+    }
 }
 
 /// A robot on the ground, ready for images.
@@ -320,12 +322,11 @@ pub fn record_unless(
     Ok(recording)
 }
 
-/// Records the start of a simulation and its present moment under a stimulus, for a picture, with
-/// positions from an origin as [`place_from`] takes it.
-pub fn moment(world: &World, body: &Body, stimulus: Grid<f64>, origin: [f64; 2]) -> Recording {
+/// Records the start of a simulation and its present moment under a stimulus, for a picture.
+pub fn moment(world: &World, body: &Body, stimulus: Grid<f64>) -> Recording {
     let mut start = world.clone();
     start.reset();
-    let frames = vec![frame_from(&start, origin), frame_from(world, origin)];
+    let frames = vec![frame(&start), frame(world)];
     let seen = LabelledStimulus {
         class: 0,
         label: "now".to_string(),
@@ -351,20 +352,11 @@ pub fn moment(world: &World, body: &Body, stimulus: Grid<f64>, origin: [f64; 2])
     }
 }
 
-fn frame(world: &World) -> Frame {
-    let place = |at: [f64; 2]| place(at, world.system().physics());
+/// Returns the present moment.
+pub(crate) fn frame(world: &World) -> Frame {
     Frame {
-        points: world.points().map(place).collect(),
-        centre: place(world.centre_of_mass()),
-    }
-}
-
-/// Returns the present moment with positions from an origin as [`place_from`] takes it.
-pub(crate) fn frame_from(world: &World, origin: [f64; 2]) -> Frame {
-    let place = |at: [f64; 2]| place_from(at, world.system().physics(), origin);
-    Frame {
-        points: world.points().map(place).collect(),
-        centre: place(world.centre_of_mass()),
+        points: world.points().map(|at| place_in(world, at)).collect(),
+        centre: place_in(world, world.centre_of_mass()),
     }
 }
 
