@@ -208,7 +208,7 @@ impl Environment {
     /// Looks at the world anew.
     fn look(&mut self) {
         self.points.clear();
-        self.points.extend(self.world.points().map(|[x, y]| [x, y]));
+        self.points.extend(self.world.points());
         self.velocities.clear();
         self.velocities.extend(self.world.velocities());
         self.centre = centre(self.points.iter().copied());
