@@ -129,7 +129,6 @@ fn moment(environment: &Environment) -> Recording {
         every: 1,
         cycle: 50,
         unstable: false,
-        terrain: None,
         judge: None,
         names: ClassNames::default(),
     }
