@@ -31,6 +31,7 @@ pub struct Environment {
     course: Arc<Course>,
     body: Body,
     world: World,
+    column: i64,
     rest: Rest,
     actuators: usize,
     /// What is seen of the world. If a step becomes unstable, it stays that of the step before.
@@ -66,6 +67,7 @@ impl Environment {
             course: Arc::clone(course),
             body: body.clone(),
             world,
+            column,
             rest: Rest::new(&[]),
             actuators: actuators(body).count(),
             points: Vec::new(),
@@ -207,8 +209,11 @@ impl Environment {
 
     /// Looks at the world anew.
     fn look(&mut self) {
+        // Absolute, in EvoGym's order of operations: at rest its last bits are observed.
+        let left = self.column as f64 * 0.1;
         self.points.clear();
-        self.points.extend(self.world.points());
+        self.points
+            .extend(self.world.points().map(|[x, y]| [left + x, y]));
         self.velocities.clear();
         self.velocities.extend(self.world.velocities());
         self.centre = centre(self.points.iter().copied());

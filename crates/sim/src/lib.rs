@@ -48,7 +48,7 @@
 //! The loops are compiled for several [instruction sets](InstructionSet). The program chooses the
 //! widest that the machine has when it runs. All of them give the same bits.
 //!
-//! Positions on flat ground are *local*: x is measured from the left edge of the robot's starting box. So a
+//! Positions are *local*: x is measured from the left edge of the robot's starting box. So a
 //! simulation does not depend on where on the ground the robot stands, except for the pegs below
 //! it, which count columns.
 //!

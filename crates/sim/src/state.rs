@@ -2,8 +2,7 @@
 
 use crate::simd::Buffer;
 use crate::system::System;
-use crate::terrain::{height, side};
-use crate::world::Start;
+use crate::terrain::height;
 
 /// Height at which slots without a point are parked \[wu\]: far from every point, above the floor.
 const PARKED: f64 = 1e6;
@@ -35,7 +34,7 @@ pub(crate) fn pair(len: usize) -> Pair {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct State {
-    /// Positions \[wu\], x from the start's left edge, on a terrain from column 0.
+    /// Positions \[wu\], local x.
     pub(crate) position: Pair,
     /// Integrated velocities \[wu/s\].
     pub(crate) velocity: Pair,
@@ -46,12 +45,12 @@ pub struct State {
 }
 
 impl State {
-    /// Makes the undeformed body at rest, its lower left cell (empty ones count) at a column and row.
-    /// On a terrain places are absolute and rounded as EvoGym's: whether a body that begins at a wall or on the
+    /// Makes the undeformed body at rest, its bottom row (empty rows count) at a grid row. On a
+    /// terrain heights are rounded as EvoGym's: whether a body that begins at a wall or on the
     /// ground touches it is decided by their last bits.
     pub(crate) fn at_rest(
         System { lattice, physics }: &System,
-        start: Start,
+        start_row: u32,
         on_terrain: bool,
     ) -> Self {
         // Slots without a point get positions of their own, so that no distance is 0.
@@ -59,22 +58,14 @@ impl State {
         let mut position: Pair = [parked, Buffer::filled(lattice.len, PARKED)];
         for &(point, (row, column)) in &lattice.points {
             // Computed from integer grid indices, so that coincident points have the same bits.
-            let (x, y) = match on_terrain {
-                true => (
-                    side(start.column as f64, column, physics.cell_size),
-                    height(
-                        f64::from(start.row),
-                        lattice.body_rows,
-                        row,
-                        physics.cell_size,
-                    ),
-                ),
-                false => (
-                    column as f64 * physics.cell_size,
-                    (start.row as usize + lattice.body_rows - row) as f64 * physics.cell_size,
-                ),
+            position[X][point] = column as f64 * physics.cell_size;
+            position[Y][point] = match on_terrain {
+                true => {
+                    let bottom = f64::from(start_row);
+                    height(bottom, lattice.body_rows, row, physics.cell_size)
+                }
+                false => (start_row as usize + lattice.body_rows - row) as f64 * physics.cell_size,
             };
-            (position[X][point], position[Y][point]) = (x, y);
         }
         let velocity = pair(lattice.len);
         State {

@@ -56,7 +56,7 @@ pub enum TerrainError {
 pub(crate) struct Cell {
     /// True for each side on the surface: top, right, bottom, left.
     pub exposed: [bool; 4],
-    /// Places of its left and right side \[wu\].
+    /// Places of its left and right side from column 0 \[wu\].
     pub left: f64,
     pub right: f64,
     /// Heights of its top and bottom \[wu\].
@@ -87,11 +87,6 @@ pub struct Terrain {
 /// Returns the height of a grid line of an object, as EvoGym rounds it: `j` rows below the top.
 pub(crate) fn height(row: f64, rows: usize, j: usize, cell_size: f64) -> f64 {
     (row * cell_size + rows as f64 * cell_size) - j as f64 * cell_size
-}
-
-/// Returns the place of a grid line of an object, as EvoGym rounds it: `i` columns from its left.
-pub(crate) fn side(column: f64, i: usize, cell_size: f64) -> f64 {
-    column * cell_size + i as f64 * cell_size
 }
 
 impl Terrain {
@@ -182,25 +177,33 @@ impl Terrain {
         inside.then(|| row as usize * self.columns + column as usize)
     }
 
-    /// Calls `visit` with the surface cells whose places come within a box \[wu\], widened by
-    /// `slack`; row by row from below.
+    /// Calls `visit` with the surface cells whose places come within a box
+    /// \[wu\], absolute columns, widened by `slack`; row by row from below.
     #[inline]
     pub(crate) fn near(
         &self,
         bounds: &Bounds,
+        start_column: i64,
         (cell_size, slack): (f64, f64),
         mut visit: impl FnMut(&Cell),
     ) {
         // One more on each side, for the rounding of coordinates.
-        let range = |low: f64, high: f64, origin: i64, count: usize| {
+        let range = |low: f64, high: f64, shift: i64, origin: i64, count: usize| {
             let first = (((low - slack) / cell_size).floor() as i64).saturating_sub(1);
             let last = (((high + slack) / cell_size).floor() as i64).saturating_add(1);
+            let (first, last) = (first.saturating_add(shift), last.saturating_add(shift));
             first.max(origin)..=last.min(origin + count as i64 - 1)
         };
         let (column, row) = self.origin;
-        for y in range(bounds.low.y, bounds.high.y, row, self.rows) {
+        for y in range(bounds.low.y, bounds.high.y, 0, row, self.rows) {
             let line = (y - row) as usize * self.columns;
-            for x in range(bounds.low.x, bounds.high.x, column, self.columns) {
+            for x in range(
+                bounds.low.x,
+                bounds.high.x,
+                start_column,
+                column,
+                self.columns,
+            ) {
                 if let Place::Surface(cell) = &self.cells[line + (x - column) as usize] {
                     visit(cell);
                 }
@@ -245,7 +248,8 @@ fn cell(object: &TerrainObject, (row, column): (usize, usize), cell_size: f64) -
         return Place::Within;
     }
     let height = |j: usize| height(f64::from(object.row), cells.height(), j, cell_size);
-    let side = |i: usize| side(f64::from(object.column), i, cell_size);
+    // Rounded as EvoGym does: the last bit decides whether a body between two walls touches both.
+    let side = |i: usize| f64::from(object.column) * cell_size + i as f64 * cell_size;
     Place::Surface(Cell {
         exposed,
         left: side(column),

@@ -102,7 +102,7 @@ impl World {
     }
 
     fn standing(system: Arc<System>, start: Start, terrain: Option<Arc<Terrain>>) -> Self {
-        let state = State::at_rest(&system, start, terrain.is_some());
+        let state = State::at_rest(&system, start.row, terrain.is_some());
         let active = &system.lattice.active;
         let pixel = |voxel: &ActiveVoxel| f64::from(u8::from(voxel.material.is_actuator()));
         World {
@@ -146,7 +146,7 @@ impl World {
 
     /// Returns to the start; the stimulus and the actuators' targets stay.
     pub fn reset(&mut self) {
-        self.state = State::at_rest(&self.system, self.start, self.terrain.is_some());
+        self.state = State::at_rest(&self.system, self.start.row, self.terrain.is_some());
         self.meter.iter_mut().for_each(Meter::rest);
     }
 
@@ -280,7 +280,7 @@ impl World {
     }
 
     /// Returns the centre of mass [x, y], the unweighted mean of the points, in world units: x from
-    /// the left edge of the starting box (on a terrain from that of column 0), y from the floor plane.
+    /// the left edge of the starting box, y from the floor plane.
     pub fn centre_of_mass(&self) -> [f64; 2] {
         let points = &self.system.lattice.points;
         let count = points.len().max(1) as f64;

@@ -188,7 +188,7 @@ impl BroadPhase {
                 Some(terrain) => {
                     let mut is_near = false;
                     let reach = (physics.cell_size, slack);
-                    terrain.near(&bounds, reach, |_| is_near = true);
+                    terrain.near(&bounds, ground.start_column, reach, |_| is_near = true);
                     is_near
                 }
             };

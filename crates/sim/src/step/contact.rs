@@ -118,7 +118,7 @@ pub(crate) fn add_contacts(
         }
         Some(terrain) => {
             for &voxel in &broad_phase.low {
-                contacts.with_terrain(&lattice.surface[voxel], terrain);
+                contacts.with_terrain(&lattice.surface[voxel], terrain, ground.start_column);
             }
         }
     }
@@ -218,12 +218,13 @@ impl Contacts<'_> {
 
     /// Adds a surface voxel's contacts with every surface cell of a terrain whose box meets its
     /// own, both ways.
-    fn with_terrain(&mut self, voxel: &SurfaceVoxel, terrain: &Terrain) {
+    fn with_terrain(&mut self, voxel: &SurfaceVoxel, terrain: &Terrain, start_column: i64) {
         let cell_size = self.physics.cell_size;
+        let origin = start_column as f64 * cell_size;
         let robot = quad(voxel, self.state);
         let bounds = Bounds::of(&robot);
-        terrain.near(&bounds, (cell_size, 0.0), |cell| {
-            let (left, right) = (cell.left, cell.right);
+        terrain.near(&bounds, start_column, (cell_size, 0.0), |cell| {
+            let (left, right) = (cell.left - origin, cell.right - origin);
             let (top, bottom) = (cell.top, cell.bottom);
             if left > bounds.high.x
                 || right < bounds.low.x

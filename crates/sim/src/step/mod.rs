@@ -25,7 +25,7 @@ use std::sync::atomic::AtomicBool;
 pub(crate) struct Ground<'a> {
     /// `None` is flat ground.
     pub terrain: Option<&'a Terrain>,
-    /// Column of the body's left edge, where x is 0 on flat ground.
+    /// Column of the body's left edge, where local x is 0.
     pub start_column: i64,
 }
 
