@@ -28,13 +28,16 @@ pub fn place([x, y]: [f64; 2], physics: &Physics) -> [f64; 2] {
     ]
 }
 
-/// Converts a position in a world to voxel lengths, with y from the flat ground, or from row 0 on
-/// terrain.
+/// Converts a position in a world to voxel lengths: from the body's left edge at the start and the
+/// flat ground, or on terrain from column 0 and row 0.
 pub fn place_in(world: &World, [x, y]: [f64; 2]) -> [f64; 2] {
     let physics = world.system().physics();
     match world.terrain() {
         None => place([x, y], physics),
-        Some(_) => [voxel_lengths(x, physics), voxel_lengths(y, physics)],
+        Some(_) => {
+            let left = world.start().column as f64;
+            [left + voxel_lengths(x, physics), voxel_lengths(y, physics)]
+        }
     }
 }
 

@@ -8,7 +8,6 @@
 //! part of the change is 0 up to rounding.
 
 use crate::lattice::{FAMILIES, spring_index};
-use crate::scratch::Scratch;
 use crate::state::{Pair, State, X, Y};
 use crate::system::System;
 
@@ -111,17 +110,18 @@ impl Meter {
     }
 
     /// Records new goals at the start of a control step.
-    pub fn drive(&mut self, scratch: &Scratch, position: &Pair) {
+    pub fn drive(&mut self, goals: [&[f64]; 2], position: &Pair) {
         let before = self.potential(position);
-        self.set_goals(scratch);
+        self.set_goals(goals);
         self.energy.drive += self.potential(position) - before;
     }
 
     /// Records the goals of the control step just completed.
-    pub fn set_goals(&mut self, scratch: &Scratch) {
+    pub fn set_goals(&mut self, goals: [&[f64]; 2]) {
         self.goals.clear();
-        self.goals.extend_from_slice(&scratch.goals);
-        self.goals.extend_from_slice(&scratch.vertical_goals);
+        goals
+            .iter()
+            .for_each(|goals| self.goals.extend_from_slice(goals));
     }
 
     /// Measures before the limits are applied.

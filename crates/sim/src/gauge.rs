@@ -52,7 +52,7 @@ impl EnergyGauge {
             position,
             now,
         } = self;
-        meter.set_goals(&world.scratch);
+        meter.set_goals([&world.scratch.goals, &world.scratch.vertical_goals]);
         // The goals of a step are set at its start, when the points are where the last left them.
         now.drive += meter.elastic(position) - now.elastic;
         position.clone_from(&world.state.position);

@@ -10,7 +10,6 @@ use crate::body::{Body, Material};
 use crate::grid::Grid;
 use crate::physics::Physics;
 use crate::simd::{BLOCK, Buffer};
-use crate::step::off_lattice::GROUP;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -19,6 +18,9 @@ pub(crate) const SIDES: [(usize, usize); 4] = [(0, 1), (1, 2), (2, 3), (3, 0)];
 
 /// Neighbouring cell across each side, in the order of [`SIDES`].
 const ACROSS: [(isize, isize); 4] = [(-1, 0), (0, 1), (1, 0), (0, -1)];
+
+/// Number of off-lattice springs computed together.
+pub(crate) const GROUP: usize = FAMILIES * BLOCK;
 
 /// Number of spring families: horizontal, vertical, falling and rising diagonals.
 pub(crate) const FAMILIES: usize = 4;

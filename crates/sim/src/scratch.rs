@@ -1,10 +1,11 @@
 //! [`Scratch`]: the memory of a substep, which is never saved.
 
+use crate::lattice::GROUP;
 use crate::simd::{BLOCK, Buffer};
 use crate::state::{Pair, State, pair};
 use crate::step::broad_phase::BroadPhase;
 use crate::step::limits::Reach;
-use crate::step::off_lattice::{GROUP, OffLattice};
+use crate::step::off_lattice::OffLattice;
 use crate::step::springs::{Pulls, Springs, Wide};
 use crate::system::System;
 

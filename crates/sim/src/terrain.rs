@@ -84,6 +84,15 @@ pub struct Terrain {
     objects: Vec<TerrainObject>,
 }
 
+/// What a robot stands on, and where.
+#[derive(Clone, Copy)]
+pub(crate) struct Ground<'a> {
+    /// `None` is flat ground.
+    pub terrain: Option<&'a Terrain>,
+    /// Column of the body's left edge, where local x is 0.
+    pub start_column: i64,
+}
+
 /// Returns the height of a grid line of an object, as EvoGym rounds it: `j` rows below the top.
 pub(crate) fn height(row: f64, rows: usize, j: usize, cell_size: f64) -> f64 {
     (row * cell_size + rows as f64 * cell_size) - j as f64 * cell_size

@@ -6,10 +6,10 @@ use crate::lattice::ActiveVoxel;
 use crate::scratch::Scratch;
 use crate::simd::{InstructionSet, dispatch};
 use crate::state::{State, X, Y};
-use crate::step::{ControlStep, Ended, Ground, actuation};
+use crate::step::{ControlStep, Ended, actuation};
 use crate::stop::{NEVER, Stopped};
 use crate::system::System;
-use crate::terrain::Terrain;
+use crate::terrain::{Ground, Terrain};
 use crate::unstable::{StepError, Unstable, UnstableReason};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -252,9 +252,10 @@ impl World {
             targets,
             [&mut scratch.goals, &mut scratch.vertical_goals],
         );
+        let goals = [&*scratch.goals, &*scratch.vertical_goals];
         meter
             .iter_mut()
-            .for_each(|meter| meter.drive(scratch, &state.position));
+            .for_each(|meter| meter.drive(goals, &state.position));
     }
 
     /// Completes a control step. Every substep checks the one before, so the last is checked here.
@@ -304,6 +305,11 @@ impl World {
         let [x, y] = &self.state.velocity;
         let points = self.system.lattice.points.iter();
         points.map(|&(point, _)| [x[point], y[point]])
+    }
+
+    /// Returns where the robot started.
+    pub fn start(&self) -> Start {
+        self.start
     }
 
     /// Returns the terrain; `None` is flat ground.

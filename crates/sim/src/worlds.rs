@@ -3,10 +3,10 @@
 use crate::grid::Grid;
 use crate::simd::{BLOCK, Kernel, Lanes, dispatch};
 use crate::step::limits::{SharedRigidPass, limit_rigid};
-use crate::step::{Ended, Ground, before_rigid};
+use crate::step::{Ended, before_rigid};
 use crate::stop::{NEVER, Stopped, check};
 use crate::system::System;
-use crate::terrain::Terrain;
+use crate::terrain::{Ground, Terrain};
 use crate::unstable::{Unstable, UnstableReason};
 use crate::world::{Start, StartError, TargetsError, World};
 use std::sync::Arc;

@@ -9,10 +9,10 @@
 use crate::lattice::{FAMILIES, Lattice, SurfaceVoxel};
 use crate::simd::{BLOCK, Buffer, Lanes, each};
 use crate::state::{Pair, State, X, Y, slices};
-use crate::step::Ground;
 use crate::step::geometry::{Bounds, Vector};
 use crate::step::springs::vectors;
 use crate::system::System;
+use crate::terrain::Ground;
 use crate::unstable::UnstableReason;
 
 /// Distance that a point may move before the lists are rebuilt \[voxel lengths\].

@@ -6,11 +6,10 @@
 use crate::lattice::{Lattice, SIDES, SurfaceVoxel};
 use crate::physics::{MOST_CELLS, Physics};
 use crate::state::{Pair, State, X, Y};
-use crate::step::Ground;
 use crate::step::broad_phase::{BroadPhase, Candidate, place, quad};
 use crate::step::geometry::{Bounds, Vector, cross, inside};
 use crate::system::System;
-use crate::terrain::Terrain;
+use crate::terrain::{Ground, Terrain};
 
 /// For each corner (clockwise from the top left), the far ends of the two sides that meet there.
 const FAR_ENDS: [[usize; 2]; 4] = [[1, 3], [0, 2], [3, 1], [2, 0]];

@@ -16,18 +16,9 @@ use crate::simd::{Kernel, Lanes};
 use crate::state::State;
 use crate::stop::{Stopped, check};
 use crate::system::System;
-use crate::terrain::Terrain;
+use crate::terrain::Ground;
 use crate::unstable::UnstableReason;
 use std::sync::atomic::AtomicBool;
-
-/// What a robot stands on, and where.
-#[derive(Clone, Copy)]
-pub(crate) struct Ground<'a> {
-    /// `None` is flat ground.
-    pub terrain: Option<&'a Terrain>,
-    /// Column of the body's left edge, where local x is 0.
-    pub start_column: i64,
-}
 
 /// The substeps of a control step.
 pub(crate) struct ControlStep<'a> {

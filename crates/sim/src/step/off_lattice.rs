@@ -1,15 +1,12 @@
 //! Springs that end in an off-lattice point, where voxels touch only at a corner: few, anywhere.
 
-use crate::lattice::{FAMILIES, Lattice};
+use crate::lattice::{GROUP, Lattice};
 use crate::simd::{BLOCK, Buffer, Lanes, each};
 use crate::state::{Pair, X, Y, pair};
 use crate::step::limits::Limits;
 use crate::step::series::rsqrt_exact;
 use crate::step::springs::{Pulls, Springs, Watch};
 use crate::system::System;
-
-/// Number of off-lattice springs computed together.
-pub(crate) const GROUP: usize = FAMILIES * BLOCK;
 
 /// The off-lattice springs' part of a substep; only their ends are read and written one by one.
 #[derive(Clone, Debug)]
