@@ -159,9 +159,9 @@ mod tests {
     fn an_unknown_schema_is_refused_with_those_that_there_are() {
         let error = Schema::named("rnu").unwrap_err();
         assert!(
-            error
-                .message
-                .contains("config, sweep, plan, audit-config, capacity-config, run, eval, audit"),
+            error.message.contains(
+                "config, sweep, plan, audit-config, capacity-config, scenario, run, eval, audit"
+            ),
             "{error}"
         );
     }

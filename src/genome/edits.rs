@@ -23,6 +23,8 @@ pub(crate) enum EditError {
     Place(usize, usize),
     #[error("edits: row {0}, column {1} is there twice")]
     Twice(usize, usize),
+    #[error("edits: row {0}, column {1}: {2} is no material that evolves; expected 0…6")]
+    Material(usize, usize, u8),
 }
 
 impl Edits {
@@ -67,6 +69,9 @@ impl TryFrom<Vec<(usize, usize, Material)>> for Edits {
         for (row, column, material) in list {
             if row >= MAX_SIDE || column >= MAX_SIDE {
                 return Err(EditError::Place(row, column));
+            }
+            if material.is_actuator() {
+                return Err(EditError::Material(row, column, material.code()));
             }
             if edits.insert((row, column), material).is_some() {
                 return Err(EditError::Twice(row, column));
@@ -128,6 +133,8 @@ mod tests {
                 .contains("row 1, column 2 is there twice")
         );
         assert!(read("[[64,2,6]]").unwrap_err().contains("row 64, column 2"));
-        assert!(read("[[1,2,7]]").unwrap_err().contains('7'));
+        assert!(read("[[1,2,9]]").unwrap_err().contains('9'));
+        let actuator = read("[[1,2,7]]").unwrap_err();
+        assert!(actuator.contains("row 1, column 2: 7 is no material that evolves"));
     }
 }
