@@ -298,6 +298,7 @@ impl Scenario {
         let key = match (&self.terrain, &self.targets) {
             (Some(_), _) => "terrain",
             (None, Some(_)) => "targets",
+            (None, None) if self.actuators().next().is_some() => "body: actuators",
             (None, None) => return Ok(()),
         };
         Err(format!(

@@ -10,7 +10,8 @@ use crate::task::class_names::ClassNames;
 use crate::task::protocol::Protocol;
 use crate::task::recording::FramedImage;
 use crate::task::stimulus::{Encoding, Reduction, StimulusParams, stimulus};
-use serde::Deserialize;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
 
 /// Maximum number of control steps in a simulation, across image changes: a hundred cycles.
 pub(crate) const MAX_STEPS: u32 = 5000;
@@ -28,8 +29,29 @@ pub(crate) struct SubjectRequest {
     /// The id of the robot there.
     robot: Option<String>,
     /// The body, in place of a robot.
+    #[serde(default, deserialize_with = "self_moving_if_any")]
     body: Option<Body>,
     encoding: Option<StimulusParams>,
+}
+
+/// Reads a body without actuators: the page cannot give them targets.
+pub(crate) fn self_moving<'de, D: Deserializer<'de>>(reader: D) -> Result<Body, D::Error> {
+    let body = Body::deserialize(reader)?;
+    match body
+        .voxels()
+        .cells()
+        .iter()
+        .any(|material| material.is_actuator())
+    {
+        false => Ok(body),
+        true => Err(D::Error::custom(
+            "expected materials 0…6: actuators (7 and 8) need targets, which the page does not give",
+        )),
+    }
+}
+
+fn self_moving_if_any<'de, D: Deserializer<'de>>(reader: D) -> Result<Option<Body>, D::Error> {
+    self_moving(reader).map(Some)
 }
 
 /// The visible image, at most one of the three; none is dark.

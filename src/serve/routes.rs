@@ -53,6 +53,7 @@ pub(crate) fn reply(service: &Service, request: &Request) -> Reply {
             #[derive(Deserialize)]
             #[serde(deny_unknown_fields)]
             struct Posted {
+                #[serde(deserialize_with = "request::self_moving")]
                 body: Body,
             }
             let Posted { body } = request::read(&request.body)?;

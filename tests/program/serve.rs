@@ -431,10 +431,14 @@ fn what_is_wrong_is_refused_with_one_line_and_hurts_nothing() {
         "physics",
     );
     refused(
-        &server.post_text("/api/scenario", "{\"body\": [[7]]}"),
+        &server.post_text("/api/scenario", "{\"body\": [[9]]}"),
         400,
         "scenario:1: body",
     );
+    for path in ["/api/scenario", "/api/body"] {
+        let answer = server.post_text(path, "{\"body\": [[7]]}");
+        refused(&answer, 400, "actuators");
+    }
 
     // After all that it is well, and no simulation has begun.
     let status = json_of(&server.get("/api/status"));
