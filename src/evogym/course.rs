@@ -60,7 +60,8 @@ impl Course {
         match hit {
             None => Ok(()),
             Some((name, (x, y))) => Err(Error::usage(format!(
-                "body: its box of {} × {} voxels at column {column}, row {row} overlaps {name} of {} at column {x}, row {y}; expected a smaller body",
+                "body: its box of {} × {} voxels at column {column}, row {row} overlaps {name} of {} \
+                 at column {x}, row {y}; expected a smaller body",
                 body.height(),
                 body.width(),
                 self.task.name

@@ -18,7 +18,7 @@ const Y: usize = 1;
 
 /// The result of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Outcome {
+pub struct StepOutcome {
     /// What it is rewarded with.
     pub reward: f64,
     /// True if the task ends here.
@@ -31,7 +31,6 @@ pub struct Environment {
     course: Arc<Course>,
     body: Body,
     world: World,
-    column: i64,
     rest: Rest,
     actuators: usize,
     /// What is seen of the world. If a step becomes unstable, it stays that of the step before.
@@ -67,7 +66,6 @@ impl Environment {
             course: Arc::clone(course),
             body: body.clone(),
             world,
-            column,
             rest: Rest::new(&[]),
             actuators: actuators(body).count(),
             points: Vec::new(),
@@ -125,7 +123,7 @@ impl Environment {
     ///
     /// # Errors
     /// As [`Environment::simulate`], and if no goal is left.
-    pub fn step(&mut self, action: &[f64]) -> Result<Outcome, Error> {
+    pub fn step(&mut self, action: &[f64]) -> Result<StepOutcome, Error> {
         self.check_goals()?;
         let task = self.course.task;
         let (from, orientation, before) = (self.centre, self.orientation, self.potential());
@@ -157,7 +155,7 @@ impl Environment {
                 (terminated, reward) = (true, reward + value);
             }
         }
-        Ok(Outcome { reward, terminated })
+        Ok(StepOutcome { reward, terminated })
     }
 
     /// Takes a step if it is active, and writes the observation.
@@ -165,8 +163,8 @@ impl Environment {
         &mut self,
         (action, active): (&[f64], &bool),
         seen: &mut [f64],
-    ) -> Result<Outcome, Error> {
-        let nothing = Outcome {
+    ) -> Result<StepOutcome, Error> {
+        let nothing = StepOutcome {
             reward: 0.0,
             terminated: false,
         };
@@ -210,7 +208,7 @@ impl Environment {
     /// Looks at the world anew.
     fn look(&mut self) {
         // Absolute, in EvoGym's order of operations: at rest its last bits are observed.
-        let left = self.column as f64 * 0.1;
+        let left = self.world.start().column as f64 * 0.1;
         self.points.clear();
         self.points
             .extend(self.world.points().map(|[x, y]| [left + x, y]));
@@ -389,7 +387,8 @@ impl Environments {
         if let Some(number) = all.iter().position(|one| sizes(one) != sizes(first)) {
             let [(p, a), (q, b)] = [sizes(first), sizes(&all[number])];
             return Err(Error::usage(format!(
-                "body {number}: expected {p} points and {a} actuators as of body 0, found {q} and {b}; whole episodes of different bodies are what returns() is for"
+                "body {number}: expected {p} points and {a} actuators as of body 0, found {q} and {b}; \
+                 whole episodes of different bodies are what returns() is for"
             )));
         }
         let is_alone = all.len() == 1 || threads == Some(1);
@@ -417,7 +416,7 @@ impl Environments {
         actions: &[f64],
         active: &[bool],
         observations: &mut [f64],
-    ) -> Result<Vec<Outcome>, Error> {
+    ) -> Result<Vec<StepOutcome>, Error> {
         let width = self.all.first().map_or(0, |one| one.actuators);
         let size = self.all.first().map_or(0, |one| one.observation.len());
         let several = self.all.len() > 1;

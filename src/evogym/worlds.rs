@@ -96,21 +96,20 @@ pub(crate) fn objects(world: &str) -> Vec<Object> {
         match line.strip_prefix("object ") {
             Some(about) => {
                 let mut words = about.split(' ');
-                let mut word = || words.next().unwrap_or_default();
+                let mut word = || words.next().expect("a test reads every line of the text");
+                let name = word();
+                let mut number = || word().parse().expect("a test reads every line of the text");
                 objects.push(Object {
-                    name: word(),
-                    column: word().parse().unwrap_or_default(),
-                    row: word().parse().unwrap_or_default(),
+                    name,
+                    column: number(),
+                    row: number(),
                     cells: Vec::new(),
                 });
             }
             None => {
                 let row = line.bytes().map(|cell| cell == b'#').collect();
-                objects
-                    .iter_mut()
-                    .next_back()
-                    .into_iter()
-                    .for_each(|last| last.cells.push(Vec::clone(&row)));
+                let last = objects.last_mut();
+                last.expect("rows follow their object").cells.push(row);
             }
         }
     }

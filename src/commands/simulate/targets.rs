@@ -141,7 +141,8 @@ impl<'de> Deserialize<'de> for Targets {
                     }
                     if targets.len() != actuators || targets.is_empty() {
                         return Err(A::Error::custom(format!(
-                            "expected the same actuators at every step, one or more: step 0 has {actuators}, step {steps} {}",
+                            "expected the same actuators at every step, one or more: step 0 has {actuators}, \
+                             step {steps} {}",
                             targets.len()
                         )));
                     }
