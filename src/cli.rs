@@ -21,6 +21,7 @@ mod tasks;
 mod team;
 mod train;
 mod values;
+mod verify;
 
 use crate::base::error::{Error, ErrorKind};
 use crate::base::ranks::Ranks;
@@ -94,6 +95,7 @@ pub(crate) fn run(cli: Cli, console: &Console, ranks: Ranks) -> Result<(), Error
         Command::Report(args) => report::run(args, console),
         Command::Sweep(args) => sweep::run(args, console),
         Command::Reproduce(args) => reproduce::run(args, console),
+        Command::Verify(args) => verify::run(args, console),
         Command::Replay(args) => run_replay(args, console),
         Command::Plot(args) => plot::run(args, console),
         Command::Simulate(args) => run_simulate(&args, console),

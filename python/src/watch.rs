@@ -261,7 +261,7 @@ impl Observer for Heard {
             return;
         };
         let (seconds, before) = recent.since(self.seconds(), done, |done| *done);
-        let words = count_line(&work.label, [before, done, work.total], work.unit, seconds);
+        let words = count_line(&work.label, [before, done, work.total], &work.unit, seconds);
         let fields = counted(work, done);
         match said.messages.last_mut() {
             Some(last) if last.0 == PROGRESS => *last = (PROGRESS, line(&words), fields),

@@ -1,7 +1,7 @@
 //! [`Observer`]: receives the progress of a command. Commands report through it and never print.
 
 use crate::base::error::Error;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Receives the progress of a command, from several threads at once. Every method is optional.
@@ -38,7 +38,7 @@ pub struct Work {
     /// Number of units done before.
     pub known: u64,
     /// Unit of the count, such as "rollouts".
-    pub unit: &'static str,
+    pub unit: String,
 }
 
 impl Work {
@@ -47,13 +47,13 @@ impl Work {
             label,
             total,
             known: 0,
-            unit,
+            unit: unit.to_string(),
         }
     }
 }
 
 /// Progress of an evolution.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Generation {
     /// Generations done.
     #[serde(rename = "generation")]

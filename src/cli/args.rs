@@ -18,9 +18,10 @@ use crate::cli::sweep::SweepArgs;
 use crate::cli::team::TeamArgs;
 use crate::cli::train::TrainArgs;
 use crate::cli::values::{MOST, decimal, held_out, offering, seed, threads, whole};
+use crate::cli::verify::VerifyArgs;
 use crate::cli::{
     audit, capacity, compare, demo, plot, report, reproduce, response, serve, site, sweep, team,
-    train,
+    train, verify,
 };
 use crate::commands::plan::PAPER_TOML;
 use crate::commands::replay::ShownImage;
@@ -152,6 +153,9 @@ Examples:
     /// Run the whole paper, at a chosen scale.
     #[command(after_help = reproduce::EXAMPLES)]
     Reproduce(ReproduceArgs),
+    /// Run the commands behind the project's claims again, and compare.
+    #[command(after_help = verify::EXAMPLES)]
+    Verify(VerifyArgs),
     /// Watch a robot: a GIF, a page for the browser, or a film.
     #[command(after_help = "\
 Examples:

@@ -275,11 +275,10 @@ impl Networks<'_> {
             String::new()
         };
         let label = format!("training {}{kept}:", counted(total, "network", "networks"));
+        let work = Work::new(label, total, "trainings");
         self.session.observer.begins(&Work {
-            label,
-            total,
             known: before,
-            unit: "trainings",
+            ..work
         });
         self.done.store(before, Ordering::Relaxed);
     }

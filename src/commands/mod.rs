@@ -26,3 +26,4 @@ pub(crate) mod table;
 pub(crate) mod tasks;
 pub mod team;
 pub mod train;
+pub mod verify;

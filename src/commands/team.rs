@@ -179,11 +179,10 @@ pub fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutcome, Err
         counted(images.len(), "image", "images"),
         counted(robots.len(), "robot", "robots")
     );
+    let work = Work::new(label, total, "rollouts");
     session.observer.begins(&Work {
-        label,
-        total,
         known: done,
-        unit: "rollouts",
+        ..work
     });
     let (pool, mut unwritten) = (session.pool()?, Unwritten::default());
     let members = |walks: &[Vec<Walk>]| -> Vec<Member> {

@@ -5,7 +5,7 @@ use morphcog::commands::plan::PAPER_TOML;
 use morphcog::commands::schema;
 use morphcog::config::BUILT_IN;
 
-const COMMANDS: [&str; 28] = [
+const COMMANDS: [&str; 29] = [
     "",
     "evolve",
     "response",
@@ -17,6 +17,7 @@ const COMMANDS: [&str; 28] = [
     "compare",
     "sweep",
     "reproduce",
+    "verify",
     "report",
     "replay",
     "plot",

@@ -35,6 +35,7 @@ mod terminal;
 mod train;
 mod tutorial;
 mod validation;
+mod verify;
 mod watching;
 mod whereabouts;
 

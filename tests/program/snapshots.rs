@@ -144,6 +144,7 @@ fn help_reads_as_it_was_reviewed() {
             ("help-team", "team --help"),
             ("help-sweep", "sweep --help"),
             ("help-reproduce", "reproduce --help"),
+            ("help-verify", "verify --help"),
             ("help-report", "report --help"),
             ("help-replay", "replay --help"),
             ("help-plot", "plot --help"),

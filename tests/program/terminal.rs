@@ -246,7 +246,7 @@ fn a_run_whose_terminal_is_closed_is_saved() {
 #[test]
 fn every_help_fits_a_terminal_and_its_words_are_whole() {
     let sandbox = Sandbox::new();
-    let commands = "|demo|serve|site|evolve|response|train|eval|team|audit|capacity|sweep|reproduce|report|\
+    let commands = "|demo|serve|site|evolve|response|train|eval|team|audit|capacity|sweep|reproduce|verify|report|\
                     replay|plot|simulate|data|data fetch|data info|data sheet|bench|gallery|config|schema|\
                     completions|man";
     for command in commands.split('|') {

@@ -259,6 +259,7 @@ fn every_command_ends_in_its_documented_way_when_a_signal_asks_it_to() {
             "reproduce -q paper.toml -o reproduce-N".to_string(),
             End::Stopped,
         ),
+        ("verify -q same-bits -o verify-N".to_string(), End::Stopped),
         (
             "simulate long.json --points -o long-N.csv".to_string(),
             End::Stopped,
@@ -296,13 +297,21 @@ fn every_command_ends_in_its_documented_way_when_a_signal_asks_it_to() {
             started.push((sandbox.start(&command.replace("-N", signal)), command, *end));
         }
         // All of them together, for none is waited for alone. These wait themselves: for an answer, for a
-        // request, and for somebody to read on.
+        // request, for somebody to read on, and for a command.
         for (child, command, _) in &mut started {
             match command.split(' ').next() {
                 Some("data") => connections.push(silent.accept().unwrap()),
                 Some("serve" | "simulate") if !command.contains("-o ") => {
                     let said = child.stdout.as_mut().unwrap().read(&mut [0; 4]).unwrap();
                     assert!(said > 0, "{command}");
+                }
+                // Its command works.
+                Some("verify") => {
+                    let run = sandbox.path(&format!("verify{signal}/same-bits/runs"));
+                    let begin = Instant::now();
+                    while !run.exists() && begin.elapsed() < Duration::from_secs(100) {
+                        std::thread::sleep(Duration::from_millis(5));
+                    }
                 }
                 _ => at_work(child),
             }

@@ -1,6 +1,7 @@
 //! Terminal output: messages, tables, progress, the results of commands, walks.
 
 pub(crate) mod bar;
+pub(crate) mod claims;
 pub(crate) mod comparisons;
 pub mod console;
 pub(crate) mod networks;

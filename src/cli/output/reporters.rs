@@ -67,7 +67,7 @@ impl Observer for Reporter<'_> {
 
     fn begins(&self, work: &Work) {
         self.show(|| {
-            let counter = self.console.counter(&work.label, work.total, work.unit);
+            let counter = self.console.counter(&work.label, work.total, &work.unit);
             if work.known > 0 {
                 counter.go_on_from(work.known);
             }

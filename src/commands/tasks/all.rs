@@ -184,12 +184,8 @@ pub(crate) fn run_all(
             Some(Run::Pair(_)) => "steps",
             _ => "generations",
         };
-        session.observer.begins(&Work {
-            label,
-            total,
-            known,
-            unit,
-        });
+        let work = Work::new(label, total, unit);
+        session.observer.begins(&Work { known, ..work });
     }
     let all = All {
         session,
