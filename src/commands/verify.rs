@@ -51,7 +51,7 @@ pub struct Claim {
     /// The values that are claimed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub values: Vec<Claimed>,
-    /// How to measure it without `verify`, because it needs more than the program.
+    /// The way to measure it without `verify`, because it needs more than the program.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub by_hand: Option<ByHand>,
     /// Processor time of all commands [min].
@@ -77,7 +77,7 @@ pub struct ByHand {
     pub command: String,
     /// Its result, in words.
     pub result: String,
-    /// What it needs besides the program.
+    /// The things it needs besides the program.
     pub needs: String,
 }
 
@@ -85,12 +85,12 @@ pub struct ByHand {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Claimed {
-    /// What it is.
+    /// The name of the quantity.
     pub label: String,
     /// Its place in the event, as a JSON pointer in which `*` stands for all items of a list; the
     /// value is their mean.
     pub(crate) at: String,
-    /// What to count: the value is the number of items that are equal to it.
+    /// The text or number to count: the value is how many items are equal to it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) count: Option<Value>,
     /// The value that is claimed, to the last bit.
@@ -123,7 +123,7 @@ impl Need {
     }
 }
 
-/// How a measured value compares with the claimed one.
+/// Comparison of a measured value with the claimed one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Agreement {
@@ -261,7 +261,7 @@ pub fn claims() -> Result<Vec<Claim>, Error> {
         .map_err(|error| Error::other(format!("data/claims.toml: {error}")))
 }
 
-/// Which claims are verified.
+/// Selection of claims.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Choice {
     /// Those that need no data and little time.
@@ -328,7 +328,7 @@ pub(crate) struct Verified {
     pub(crate) program_version: String,
     /// The measured values, in the order of the claimed ones; `None` if an event lacks it.
     pub(crate) measured: Vec<Option<f64>>,
-    /// How each compares.
+    /// Comparison of each with the claimed value.
     pub(crate) agreements: Vec<Agreement>,
     /// The error of a command that failed.
     pub(crate) error: Option<String>,

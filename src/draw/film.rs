@@ -74,7 +74,7 @@ pub(crate) fn shown(walk: &Walk, every: usize) -> Vec<usize> {
         .collect()
 }
 
-/// How the pictures of a recording are laid out.
+/// Layout of the pictures of a recording.
 pub(crate) struct Film<'a> {
     walk: &'a Walk<'a>,
     stage: Stage,

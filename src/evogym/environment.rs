@@ -19,7 +19,7 @@ const Y: usize = 1;
 /// The result of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepOutcome {
-    /// What it is rewarded with.
+    /// The reward of a step.
     pub reward: f64,
     /// True if the task ends here.
     pub terminated: bool,
@@ -33,7 +33,7 @@ pub struct Environment {
     world: World,
     rest: Rest,
     actuators: usize,
-    /// What is seen of the world. If a step becomes unstable, it stays that of the step before.
+    /// Observation of the world. If a step becomes unstable, it stays that of the step before.
     points: Vec<[f64; 2]>,
     velocities: Vec<[f64; 2]>,
     centre: [f64; 2],

@@ -1,4 +1,4 @@
-//! What is measured of a robot's points: centre, orientation, area and sight.
+//! Measurements of a robot's points: centre, orientation, area and sight.
 
 use crate::evogym::worlds::Object;
 

@@ -20,7 +20,7 @@ pub(crate) enum Part {
     Ceiling(u32),
 }
 
-/// What a step is rewarded for; c is the centre \[wu\].
+/// Reward of a step; c is the centre \[wu\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Reward {
     /// Growth of the weighted sum of c's coordinates.

@@ -84,7 +84,7 @@ pub struct Terrain {
     objects: Vec<TerrainObject>,
 }
 
-/// What a robot stands on, and where.
+/// The ground of a robot, and its start on it.
 #[derive(Clone, Copy)]
 pub(crate) struct Ground<'a> {
     /// `None` is flat ground.

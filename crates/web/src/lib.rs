@@ -10,7 +10,7 @@ use morphcog::serve::local::Local;
 use serde::Deserialize;
 use std::cell::RefCell;
 
-/// What the worker asks for.
+/// A request of the worker.
 #[derive(Deserialize)]
 #[serde(tag = "call", rename_all = "lowercase", deny_unknown_fields)]
 enum Call {

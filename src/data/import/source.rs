@@ -46,7 +46,7 @@ struct Entry {
     path: PathBuf,
 }
 
-/// What lies in a folder, sorted by name; nothing hidden.
+/// The entries of a folder, sorted by name, without hidden ones.
 #[derive(Debug)]
 struct Listing {
     folders: Vec<Entry>,
