@@ -84,13 +84,13 @@ Examples:
 
 Exit codes:
   0    done
-  1    failed
+  1    failed for another reason, such as a full disk
   2    wrong command line
-  3    wrong or missing input file
+  3    file missing or wrong, or a value out of range
   4    rollout unstable (simulate)
-  5    run folder taken
+  5    run folder, dataset folder or port taken
   75   stopped by a signal, saved, can be resumed
-  130  stopped at once";
+  130  stopped at once by a second Ctrl-C";
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {

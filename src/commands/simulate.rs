@@ -30,9 +30,9 @@ use targets::{Targets, TargetsForm};
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
-    /// The body as rows of 0…8.
+    /// The body as rows of 0…8; 7 and 8 are EvoGym's horizontal and vertical actuator.
     pub(crate) body: Body,
-    /// One stimulus for the whole simulation: a pixel per voxel, 0 to 1.
+    /// One stimulus for the whole simulation: a pixel per voxel, 0 to 1. Default dark.
     #[schemars(with = "Option<Vec<Vec<f64>>>")]
     stimulus: Option<Grid<f64>>,
     /// Several stimuli, each for `switch_every` control steps; after the last, the first follows.
@@ -44,10 +44,11 @@ pub struct Scenario {
     /// True if the robot returns to its initial state at every switch.
     #[serde(default)]
     reset_between: bool,
-    /// The length of each actuator at every control step; without targets, they rest.
+    /// The length of each actuator at every control step, row-major; without targets, they rest.
     #[schemars(with = "Option<TargetsForm>")]
     targets: Option<Targets>,
-    /// Objects of fixed cells on which the body starts, instead of the flat ground.
+    /// Objects of fixed cells on which the body starts, instead of the flat ground. They do not
+    /// overlap; each is one piece.
     #[serde(default, deserialize_with = "some_objects")]
     #[schemars(with = "Option<Vec<FixedObject>>")]
     terrain: Option<Vec<FixedObject>>,
@@ -56,7 +57,8 @@ pub struct Scenario {
     /// Grid row of its bottom row: 2 is on the flat ground; needed with terrain, whose rows count
     /// from 0.
     start_row: Option<u32>,
-    /// Number of control steps.
+    /// Number of control steps, at most 1,000,000. Default: `stimuli` or listed `targets` each once,
+    /// else 500.
     control_steps: Option<u64>,
     /// Constants of the simulator that differ from the defaults.
     #[serde(default)]

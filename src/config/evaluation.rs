@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct EvaluationConfig {
-    /// The fitness of answers to several images. Default the smallest margin, the paper's.
+    /// The rule that turns answers to several images into one number. Default min.
     pub fitness: Fitness,
 }
 

@@ -76,8 +76,9 @@ pub struct Config {
     /// The seed of all random numbers. Default 1.
     #[serde(default = "one")]
     pub seed: u64,
-    /// The number of generations, including the first (random) one. Default 30,000, the paper's.
+    /// Generations, including the first, random one. Default 30000, the paper's.
     #[serde(default = "paper_generations")]
+    #[schemars(range(min = 1))]
     pub generations: u64,
     /// The size of bodies and the condition for valid ones.
     #[serde(default)]
@@ -170,11 +171,15 @@ fn paper_generations() -> u64 {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct BodyConfig {
-    /// The number of rows. Default 14.
+    /// Rows of a body's grid. Default 14, the paper's.
+    #[schemars(range(min = 1, max = MAX_SIDE))]
     pub height: usize,
-    /// The number of columns. Default 14.
+    /// Columns of a body's grid. Default 14, the paper's.
+    #[schemars(range(min = 1, max = MAX_SIDE))]
     pub width: usize,
-    /// The minimum number of muscle voxels. Default 3.
+    /// Least number of muscle voxels. Default 3, the paper's.
+    ///
+    /// A valid body is also connected through sides.
     pub(crate) min_muscles: usize,
 }
 
@@ -192,25 +197,32 @@ impl Default for BodyConfig {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DataConfig {
-    /// The dataset: "mnist", "fashion-mnist", "builtin", or a name of your own.
+    /// `mnist`, `fashion-mnist`, `builtin`, `gates`, or a name of your own.
     pub dataset: String,
-    /// The folder of its files, if neither `--data` nor `MORPHCOG_DATA` gives one, nor the run
-    /// where they were. Default `data/<dataset>`.
+    /// Folder of its files; `--data`, `MORPHCOG_DATA` and what a run remembers go before it.
+    /// Default `data/<dataset>`.
+    ///
+    /// No other folder is tried. If the folder has a subfolder with the dataset's name, that one is
+    /// used. A leading `~` is the home folder, as in every path of a config or plan.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) dir: Option<PathBuf>,
-    /// True to swap rows and columns of the images in the files, for images that are stored
-    /// mirrored and turned. Default: true for EMNIST, recognised by its names.
+    /// True to swap rows and columns of the images. Default true for EMNIST, which is published so.
+    ///
+    /// EMNIST is recognised by the names of its dataset, files or folder.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) transpose: Option<bool>,
-    /// The names of the classes, from class 0, for tables and pictures. Default: those in the
-    /// dataset's own `dataset.json`, else the classes have numbers.
+    /// Names of the classes from class 0, for display. Default those in the dataset's
+    /// `dataset.json`.
+    ///
+    /// A class without a name, or with the name "", has its number. No result depends on names.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) class_names: Vec<String>,
-    /// The training images by index, in the order of a sequential rollout.
+    /// Indices of the training images, at least one per class, in the order of a sequential rollout.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub train_images: Option<Vec<usize>>,
-    /// Without `train_images`: the number of images per class, drawn by the run's seed. Default 1.
+    /// Without `train_images`: training images per class, drawn by the run's seed. Default 1.
     #[serde(default = "one_image")]
+    #[schemars(range(min = 1))]
     pub images_per_class: usize,
     /// The built-in digits, for `dataset = "builtin"`.
     #[serde(default)]
@@ -243,12 +255,12 @@ fn one_image() -> usize {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ArchiveConfig {
-    /// The fitness that counts as zero in the QD score \[voxel lengths\]; smaller ones count
-    /// negatively. Default 0.
+    /// Fitness that adds 0 to the QD score; smaller ones count negatively. Default 0.
     pub qd_offset: f64,
-    /// The number of elites per task that stay in the archive after each generation, the fittest.
-    /// Default: all. Smaller values make the search greedy.
+    /// Fittest elites per task that stay after each generation. Few make the search greedy.
+    /// Default all.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1))]
     pub keep: Option<usize>,
 }
 
@@ -257,9 +269,12 @@ pub struct ArchiveConfig {
 #[serde(default, deny_unknown_fields)]
 pub struct CheckpointConfig {
     /// Generations between two checkpoints. Default 1000; larger values lose more at a power cut.
+    #[schemars(range(min = 1))]
     pub(crate) generations: u64,
-    /// Seconds between two checkpoints; longer if writing takes over a fiftieth of that. Default
-    /// 10.
+    /// Seconds between two checkpoints. Default 10.
+    ///
+    /// More if writing one takes over a fiftieth of that.
+    #[schemars(range(min = 0))]
     pub(crate) seconds: f64,
 }
 

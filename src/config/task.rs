@@ -10,17 +10,17 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TaskConfig {
-    /// One task: two groups of classes that should walk opposite ways.
+    /// One task, as `[[0], [1]]`: groups of classes for which robots walk opposite ways.
     #[serde(
         skip_serializing_if = "Option::is_none",
         deserialize_with = "pair::read_some"
     )]
     pub groups: Option<[Vec<u8>; 2]>,
-    /// All ways to split these classes into two groups; the task that a robot performs is a
-    /// dimension of the archive.
+    /// Tasks are all ways to split these 2 to 10 classes into two groups; they are a dimension of
+    /// the archive.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) splits: Option<Vec<u8>>,
-    /// With `splits`: one more bin for robots that always walk one way, as in the published code.
+    /// With `splits`: one more bin for robots that always walk one way (the paper's code).
     pub(crate) same_way_bin: bool,
 }
 

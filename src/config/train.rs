@@ -10,30 +10,43 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrainConfig {
-    /// The training images of each class for the model; robots walk under only a few of them.
-    /// Default 2000, or three quarters of the scarcest class if that is less: more make designs
-    /// general, and cost little.
+    /// Training images per class for the model, at most three quarters of the scarcest class's.
+    /// Default 2000.
+    ///
+    /// Few of them are simulated. More make designs general, and cost little. Two thirds of the
+    /// scarcest class's where validation would run short.
+    #[schemars(range(min = 1))]
     pub(crate) images_per_class: usize,
-    /// The rollouts with random images that measure a gait's response. Default 300: with fewer than
-    /// two for each soft voxel and sensor the slopes are mostly noise.
+    /// Random images that measure a gait's response, two or more per soft voxel and sensor. Default
+    /// 300.
+    ///
+    /// With fewer, slopes are mostly noise.
+    #[schemars(range(min = LEAST_RANDOM_IMAGES, max = MOST_RANDOM_IMAGES))]
     pub(crate) random_images: usize,
-    /// The windows of the images tried for each gait, that of `stimulus.margin` first; the robot
-    /// gets the one that the model finds best for the task. Default 0: only that of
-    /// `stimulus.margin`. Values above 0 require the reduction "area". They cost no rollouts.
+    /// Windows that the model compares for each gait; the best becomes `stimulus.margin`. They cost
+    /// no rollouts, and require the reduction `area`. Default 0, only that of `stimulus.margin`.
+    ///
+    /// That of `stimulus.margin` is the first. With `rounds = 0` none are tried.
     #[serde(skip_serializing_if = "is_zero")]
+    #[schemars(range(max = MOST_WINDOWS))]
     pub windows: usize,
-    /// The rounds in which the response is measured around the latest design, and the design
-    /// problem is solved again. Default 6: more seldom help. With 0, the robot keeps its own soft
-    /// voxels and sensors, and is only refined; of several robots, the fittest.
+    /// Rounds of measuring around the latest design and solving again. Default 6, more seldom help.
+    ///
+    /// With 0, the fittest robot keeps its own soft voxels and sensors, and is only refined.
     pub(crate) rounds: usize,
-    /// The training images per round. Default 120: fewer make slopes noisier and the constant
-    /// wrong.
+    /// Training images per round. Default 120, fewer make slopes noisier.
+    #[schemars(range(min = 2))]
     pub(crate) images: usize,
-    /// The training images on which designs and challengers compete: at least one of every class,
-    /// the groups alternating. Default 400: with fewer, small gains look like chance.
+    /// Training images on which designs and challengers compete. Default 400, with fewer, small
+    /// gains look like chance.
+    ///
+    /// At least one of every class, the groups alternating, and others after every thirty
+    /// challengers.
+    #[schemars(range(min = 2))]
     pub(crate) final_images: usize,
-    /// The bodies that challenge the best design, in sensors or in a few voxels of any material.
-    /// Default 30; later ones win more seldom.
+    /// Bodies that challenge the best design. Default 30, later ones win less often.
+    ///
+    /// They differ in sensors or in a few voxels of any material.
     pub challengers: usize,
     /// The conditions that alternate between images, so that designs do not depend on the first
     /// touch of the ground or exploit length limits.

@@ -11,9 +11,13 @@ pub(crate) const IMAGES_KEY: &str = "validation.images";
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ValidationConfig {
-    /// The number of images, evenly divided between the classes; never trained on. Default 400.
+    /// Images in all, equally many per class, of the training split but not trained on. Default 400.
+    #[schemars(range(min = LEAST))]
     pub images: usize,
-    /// The number of robots per task that they choose at the run's end. Default 0: no validation.
+    /// Robots per task chosen on the images when a run ends; its `best` robot is then the first.
+    /// Default 0, no validation.
+    ///
+    /// They are kept in `validation.json`.
     pub(crate) best: usize,
 }
 

@@ -17,13 +17,17 @@ pub const BUILTIN: &str = "builtin";
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct BuiltinDigits {
-    /// Seed of the images.
+    /// Seed of the images. Default 1.
     pub(crate) seed: u64,
-    /// The digits (0 … 9) in the order in which they take turns.
+    /// Digits, which take turns. Default 0 to 9.
+    ///
+    /// They are different, and image `i` shows `classes[i % k]`.
     pub(crate) classes: Vec<u8>,
-    /// Number of training images of each class.
+    /// Training images of each class. Default 1000.
+    #[schemars(range(max = MAX_PER_CLASS))]
     pub(crate) train_per_class: usize,
-    /// Number of test images of each class.
+    /// Test images of each class. Default 500.
+    #[schemars(range(max = MAX_PER_CLASS))]
     pub(crate) test_per_class: usize,
 }
 

@@ -7,21 +7,29 @@ use serde::{Deserialize, Deserializer, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MutationParams {
-    /// Standard deviation of the change of a weight. Default 0.5.
+    /// Standard deviation of a weight's mutation. Default 0.5, the paper's.
+    ///
+    /// Sizes are above 0, and at most 1000.
     #[serde(deserialize_with = "size")]
     pub(crate) weight_sigma: f64,
-    /// Limit of a changed weight, which is clipped to [−limit, limit]. Default 1.
+    /// Limit to which a changed weight is clipped. Default 1, the paper's.
     #[serde(deserialize_with = "size")]
     pub(crate) weight_limit: f64,
-    /// Absolute weight of an added edge; its sign is random. Default 0.1.
+    /// Absolute weight of an added edge; its sign is random. Default 0.1, the paper's.
     #[serde(deserialize_with = "size")]
     pub(crate) new_edge_weight: f64,
-    /// Fraction of offspring in which voxels are mutated instead of the network
-    /// ([`Edits`](crate::genome::Edits)). Default 0, as in the paper; then left out of files.
+    /// Share of offspring in which voxels mutate instead of the network. Default 0, the paper's.
+    ///
+    /// A mutated network seldom changes one voxel alone.
+    /// The genome keeps them as [`Edits`](crate::genome::Edits) (after HybrID, Clune et al. 2009).
+    /// Files omit the default.
+    #[schemars(range(min = 0, max = 1))]
     #[serde(deserialize_with = "share", skip_serializing_if = "is_zero")]
     pub(crate) voxel_mutations: f64,
-    /// Most voxels of an offspring that change: 1, 2, 4 and so on, doubled up to this, with equal
-    /// probability. Default 1; then left out of files.
+    /// Most voxels of an offspring that mutate: 1, 2, 4 … with equal probability. Default 1.
+    ///
+    /// Files omit the default.
+    #[schemars(range(min = 1, max = MAX_CHANGES))]
     #[serde(deserialize_with = "changes", skip_serializing_if = "is_one")]
     pub(crate) voxel_changes: u16,
 }

@@ -10,11 +10,13 @@ use std::num::NonZeroU16;
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct EmitterParams {
-    /// Random individuals of a generation that starts with an empty archive: the first. Default 20.
+    /// Random individuals of the first generation. Default 20, the paper's.
+    ///
+    /// Also of later ones, as long as the archive is empty.
     pub(crate) initial: NonZeroU16,
-    /// Most elites that become parents, with one offspring each. Default 20.
+    /// Most elites per generation that have a mutated offspring. Default 20, the paper's.
     pub parents: u16,
-    /// Random individuals of later generations. Default 0.
+    /// Random individuals of each later generation. Default 0.
     pub(crate) random_immigrants: u16,
 }
 

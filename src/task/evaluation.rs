@@ -20,12 +20,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Savings {
-    /// True to simulate no body twice in a run: it would be exactly as fit, and only strictly
-    /// fitter robots enter the archive.
+    /// Simulates no body twice on the same images. Default true.
+    ///
+    /// It would be exactly as fit, and only strictly fitter robots enter the archive.
     pub known_bodies: bool,
-    /// True to stop simulating offspring that can no longer beat the elite of any possible cell.
+    /// Stops simulating offspring that can no longer beat an elite. Default true.
     pub early_stop: bool,
-    /// True to share a rollout among images that give a body's sensors the same pixels.
+    /// Simulates images once that show a body's sensors the same pixels. Default true.
     pub shared_rollouts: bool,
 }
 

@@ -33,14 +33,18 @@ const SLACK: f64 = 1e-9;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Fitness {
-    /// The smallest margin \[voxel lengths\], as in the paper. With many images, one wrong answer
-    /// makes standing still the best result within reach.
+    /// The smallest margin, the paper's, for one image per class.
+    ///
+    /// In voxel lengths. With many images, one wrong answer makes standing still the best result
+    /// within reach.
     #[default]
     Min,
-    /// The mean of the margins, each divided by ten voxel lengths and clipped to −1 … 1.
+    /// The mean of margins / 10, clipped to −1 … 1, for several images per class.
     MeanClipped,
-    /// The strength of a gait's response to its voxels' pixels, whatever its task \[voxel
-    /// lengths\]: `√(mean(o²) − var(e)) − |mean(e)| / 8`. Images are used as they are and inverted:
+    /// The strength of a gait's response to its voxels' pixels, for gaits to be trained.
+    ///
+    /// In voxel lengths: `√(mean(o²) − var(e)) − |mean(e)| / 8`, whatever the task. Images are used
+    /// as they are and inverted:
     ///
     /// - `o` is half the difference of the two displacements: the part linear in voxel widths;
     /// - `e` is half their sum: the nonlinear part, and the distance that the body walks anyway;
@@ -48,9 +52,16 @@ pub enum Fitness {
     ///   conditions](crate::task::perturbation::of_response) that pairs take in turn. Chance is in
     ///   both terms, and adds nothing on average.
     ///
-    /// The sensors have to make up for an eighth of the distance that the body walks anyway. A run
-    /// measures the response of the body's [probe](crate::body::Body::probe) and multiplies it by
-    /// the root of the number of its sensors. Both ways to assign directions have the same fitness.
+    /// The sensors have to make up for an eighth of the distance that the body walks anyway. Both
+    /// ways to assign directions have the same fitness.
+    ///
+    /// A run simulates the body's [probe](crate::body::Body::probe): every soft voxel and sensor
+    /// becomes an expanding sensor. It sees as many images as there are training images, in pairs of
+    /// opposites: pixels are bright, dark or at rest at random, and those that are the same in all
+    /// training images stay. Every second pair starts one voxel higher and without length limits.
+    /// The result is multiplied by the root of the number of the probe's sensors, which counts up to
+    /// two thirds of the grid. A body that is not half as good as it must be after half of its pairs
+    /// (four at least) is simulated no further.
     Response,
 }
 

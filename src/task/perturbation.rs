@@ -124,9 +124,11 @@ pub(crate) struct PerturbedSetting {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub(crate) struct ByTurns {
-    /// Most rows by which the start is raised. Default 2.
+    /// Most rows by which starts are raised, in turn from 0. Default 2.
     pub(crate) start: u32,
-    /// True if half of the images are simulated without length limits. Default true.
+    /// Simulates half of the images without length limits. Default true.
+    ///
+    /// Then the limits of soft and active voxels lie beyond every goal.
     pub(crate) length_limits: bool,
 }
 

@@ -16,9 +16,9 @@ pub const MAX_ROW: u32 = 2_000_000;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum RolloutMode {
-    /// One rollout per image, from the initial state (the paper's text).
+    /// One per image (the paper's text).
     Fresh,
-    /// One continuous rollout: each image in turn, without a reset (the published zero-one runs).
+    /// One in which the images follow each other (the published zero-one runs).
     Sequential,
 }
 
@@ -26,14 +26,17 @@ pub enum RolloutMode {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Protocol {
-    /// One rollout per image ("fresh") or one for all ("sequential"). Default fresh.
+    /// Simulations per robot. Default fresh.
     pub rollout: RolloutMode,
-    /// Number of control steps per image. Default 500: ten actuation cycles.
+    /// Control steps per image; 50 are an actuation cycle. Default 500, the paper's.
+    #[schemars(range(min = 1, max = MAX_STEPS))]
     pub control_steps: u32,
-    /// Grid row of the body's bottom row at the start \[voxels\]. Default 2: on the ground.
+    /// Grid row of the body's bottom row at the start; 2 is on the ground. Default 2, EvoGym's.
+    #[schemars(range(max = MAX_ROW))]
     pub start_row: u32,
-    /// Grid column of the body's left edge at the start \[voxels\]. Default 493, the paper's; only
-    /// the pegs below the ground distinguish columns.
+    /// Grid column of the body's left edge; only pegs below the ground distinguish columns. Default
+    /// 493, EvoGym's.
+    #[schemars(range(min = -MAX_COLUMN, max = MAX_COLUMN))]
     pub start_column: i64,
 }
 

@@ -11,12 +11,15 @@ use std::borrow::Cow;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Reduction {
-    /// Every s-th row and column (0, s, 2s, …), as in the paper, where s = 2 takes 28 × 28 to 14 ×
-    /// 14. Rows and columns each have their own s; the body's sides must divide the image's.
+    /// Every s-th row and column, as in the paper; the body's sides must divide the image's.
+    ///
+    /// These are 0, s, 2s, …; s = 2 takes 28 × 28 to 14 × 14. Rows and columns each have their own
+    /// s.
     #[default]
     Stride,
-    /// The mean of the raw pixel values under each voxel; pixels cut by its edges count by the area
-    /// inside. For bodies of any size. The mean is encoded, not the pixels.
+    /// The mean of the raw pixels under each voxel, for bodies of any size.
+    ///
+    /// Pixels cut by a voxel's edges count by the area inside. The mean is encoded, not the pixels.
     Area,
 }
 
@@ -24,12 +27,12 @@ pub enum Reduction {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Encoding {
-    /// value / 255: "proportional to the intensity of the pixel" (the paper's text).
+    /// Value / 255 (the paper's text).
     #[default]
     Intensity,
-    /// 1 for any value above 0, else 0: the paper's published robots evolved under this encoding.
+    /// 1 for any value above 0 (the paper's published robots).
     Saturated,
-    /// 1 if value / 255 is above [`StimulusParams::level`], else 0.
+    /// 1 if value / 255 is above `level`, else 0.
     Threshold,
 }
 
@@ -37,15 +40,17 @@ pub enum Encoding {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct StimulusParams {
-    /// "stride" (default) or "area".
+    /// From an image to the body's grid. Default stride.
     pub reduction: Reduction,
-    /// "intensity" (default), "saturated" or "threshold".
+    /// From a pixel (0 to 255) to a stimulus. Default intensity.
     pub encoding: Encoding,
-    /// For the encoding "threshold": the level, from 0 up to but below 1. Default 0.5.
+    /// For `threshold`, from 0 to below 1. Default 0.5.
     pub level: f64,
-    /// Rows and columns of pixels left out at the edges, before the reduction: a number, or [top,
-    /// right, bottom, left]. Default 0. MNIST's digits lie in the middle 20 × 20 of 28 × 28 pixels:
-    /// with 4, every sensor covers a part of them.
+    /// Pixels left out at the edges before the reduction: a number, or `[top, right, bottom, left]`.
+    /// What is left is the *window*. Default 0.
+    ///
+    /// MNIST's digits lie in the middle 20 × 20 of 28 × 28 pixels: with 4, sensors at the sides of a
+    /// body also cover a part of them.
     #[serde(skip_serializing_if = "Margins::is_none")]
     pub margin: Margins,
 }

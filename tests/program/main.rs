@@ -8,6 +8,7 @@ mod capacity;
 mod compare;
 mod configs;
 mod data;
+mod documents;
 mod eval;
 mod film;
 mod full_disk;

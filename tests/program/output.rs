@@ -3,6 +3,7 @@
 use crate::common::program::{PROGRAM, Sandbox, files, said};
 use crate::simulate::scenario;
 use crate::with_run;
+use morphcog::commands::schema::{self, Schema};
 use morphcog::store::eval::EvalFile;
 use morphcog::store::run::RunFile;
 use std::collections::BTreeSet;
@@ -306,11 +307,12 @@ fn with_json_every_line_on_stdout_is_json() {
     assert_eq!(events("evolve -c tiny.toml -o x --set a=1", 2), ["error"]);
 }
 
-/// The rows of tables in the documentation, from a heading on: what the first cell names, and the
+/// The rows of tables in the documentation between two headings: what the first cell names, and the
 /// whole row.
-fn documented(name: &str, heading: &str) -> Vec<(Vec<String>, String)> {
+fn documented(name: &str, [from, to]: [&str; 2]) -> Vec<(Vec<String>, String)> {
     let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
-    let (_, text) = text.split_once(heading).unwrap();
+    let (_, text) = text.split_once(from).unwrap();
+    let (text, _) = text.split_once(to).unwrap();
     let row = |line: &str| {
         let line = line.replace("\\|", "¦");
         let first = line
@@ -331,7 +333,7 @@ fn documented(name: &str, heading: &str) -> Vec<(Vec<String>, String)> {
 
 #[test]
 fn every_event_of_json_is_documented_with_its_fields() {
-    let rows = documented("docs/command-line.md", "### JSON");
+    let rows = documented("docs/command-line.md", ["\n### JSON\n", "\n## "]);
     let row = |event: &str| {
         let found = rows
             .iter()
@@ -339,6 +341,20 @@ fn every_event_of_json_is_documented_with_its_fields() {
         &found
             .unwrap_or_else(|| panic!("the event {event} is not documented"))
             .1
+    };
+    // A row may name a file instead of the fields that it has from there.
+    let columns = documented("docs/file-formats.md", ["\n## sweep.csv\n", "\n## "]);
+    let is_of_a_file = |row: &str, field: &str| {
+        let of_schema = |schema: &Schema| {
+            row.contains(&format!("`{}.json`", schema.name))
+                && schema.json()["properties"].get(field).is_some()
+        };
+        let is_column = || {
+            columns
+                .iter()
+                .any(|(names, _)| names.iter().any(|name| name == field))
+        };
+        schema::ALL.iter().any(of_schema) || row.contains("`sweep.csv`") && is_column()
     };
     // All that the source has.
     let mut open = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("src")];
@@ -426,8 +442,9 @@ fn every_event_of_json_is_documented_with_its_fields() {
                 .keys()
                 .filter(|field| *field != "event")
             {
+                let row = row(event);
                 assert!(
-                    row(event).contains(&format!("`{field}`")),
+                    row.contains(&format!("`{field}`")) || is_of_a_file(row, field),
                     "{args}: {event} has {field}"
                 );
             }
@@ -473,7 +490,7 @@ fn every_column_of_a_test_and_of_an_audit_is_explained() {
     sandbox
         .run("evolve -q -c tiny.toml -o run --generations 40 --set protocol.control_steps=150")
         .ended(0, &[]);
-    let rows = documented("docs/analysing.md", "## Test");
+    let rows = documented("docs/analysing.md", ["\n## Test\n", "\n### Verdicts\n"]);
     let explained: Vec<&str> = rows
         .iter()
         .flat_map(|(names, _)| names)
