@@ -4,6 +4,7 @@
 use clap::CommandFactory;
 use morphcog::cli::Cli;
 use morphcog::commands::schema::{self, Schema};
+use morphcog::commands::verify;
 use morphcog::config::Config;
 use serde_json::Value;
 use std::path::Path;
@@ -216,6 +217,38 @@ fn schemas() -> String {
     text.trim_end().to_string()
 }
 
+/// Claims with their commands, values, costs and places.
+fn claims() -> String {
+    let mut lines = vec![
+        "claim | command | expected | CPU minutes | needs | in the repository".to_string(),
+        "---|---|---|---|---|---".to_string(),
+    ];
+    for claim in verify::claims().unwrap() {
+        let commands: Vec<String> = claim
+            .typed()
+            .iter()
+            .map(|line| format!("`{line}`"))
+            .collect();
+        let name = match claim.by_hand {
+            Some(_) => String::new(),
+            None => format!("`{}`: ", claim.name),
+        };
+        let shipped = claim.shipped.split(", ").filter(|path| !path.is_empty());
+        let shipped: Vec<String> = shipped.map(|path| format!("[{path}](../{path})")).collect();
+        let cells = [
+            format!("{name}{}", claim.claim),
+            commands.join("<br>"),
+            claim.expected(),
+            format!("{} ({})", claim.cpu_minutes, claim.processor),
+            claim.needed(),
+            shipped.join(", "),
+        ];
+        // A bar inside a cell would end it.
+        lines.push(cells.map(|cell| cell.replace('|', "\\|")).join(" | "));
+    }
+    lines.join("\n")
+}
+
 /// A page as it must be: every part between its marks made anew.
 fn made(page: &str) -> (String, usize) {
     const END: &str = "<!-- end of generated -->";
@@ -230,6 +263,7 @@ fn made(page: &str) -> (String, usize) {
             "commands" => commands(),
             "exit codes" => exit_codes(),
             "schemas" => schemas(),
+            "claims" => claims(),
             _ => panic!("nothing makes {name}"),
         };
         text += &format!("{before}<!-- generated: {name} -->\n\n{part}\n\n{END}");
@@ -263,7 +297,7 @@ fn generated_parts_of_pages_are_what_the_program_says() {
             "{name}: UPDATE_SNAPSHOTS=1 writes it anew; the first difference: {differing:?}"
         );
     }
-    assert_eq!(count, 4);
+    assert_eq!(count, 5);
 }
 
 /// Ranges in a schema are those of the program: it refuses a value outside and accepts the ends.
