@@ -9,7 +9,7 @@ pub(crate) fn list(console: &Console, claims: &[Claim]) {
     if console.mode() == Mode::Json {
         return claims
             .iter()
-            .for_each(|claim| console.event("claim", claim));
+            .for_each(|claim| console.event("claim", &serde_json::json!({ "claim": claim })));
     }
     for claim in claims {
         console.line(&format!("{}: {}", claim.name, claim.claim));
