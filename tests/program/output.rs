@@ -315,11 +315,7 @@ fn documented(name: &str, [from, to]: [&str; 2]) -> Vec<(Vec<String>, String)> {
     let (text, _) = text.split_once(to).unwrap();
     let row = |line: &str| {
         let line = line.replace("\\|", "¦");
-        let first = line
-            .strip_prefix("| ")?
-            .split(" | ")
-            .next()?
-            .replace('¦', "|");
+        let first = line.split_once(" | ")?.0.replace('¦', "|");
         let names = first
             .split('`')
             .skip(1)
