@@ -2,7 +2,7 @@
 //! measure with what is claimed.
 
 use crate::base::error::Error;
-use crate::base::files::write_atomically;
+use crate::base::files::{read_text, write_atomically};
 use crate::base::number;
 use crate::base::observer::{Generation, Work};
 use crate::base::session::Session;
@@ -456,7 +456,7 @@ fn environment(
 
 /// Returns the result in a folder, if this version of the program measured the same claim.
 fn known(claim: &Claim, folder: &Path) -> Option<Verified> {
-    let text = std::fs::read_to_string(folder.join(VERIFIED_JSON)).ok()?;
+    let text = read_text(&folder.join(VERIFIED_JSON)).ok()?;
     let found: Verified = serde_json::from_str(&text).ok()?;
     let is_same = found.claim == *claim && found.program_version == env!("CARGO_PKG_VERSION");
     (is_same && found.error.is_none()).then_some(found)
