@@ -220,8 +220,8 @@ fn schemas() -> String {
 /// Claims with their commands, values, costs and places.
 fn claims() -> String {
     let mut lines = vec![
-        "claim | command | expected | CPU minutes | needs | in the repository".to_string(),
-        "---|---|---|---|---|---".to_string(),
+        "claim, commands | expected | CPU minutes | needs | files".to_string(),
+        "---|---|---|---|---".to_string(),
     ];
     for claim in verify::claims().unwrap() {
         let commands: Vec<String> = claim
@@ -236,8 +236,7 @@ fn claims() -> String {
         let shipped = claim.shipped.split(", ").filter(|path| !path.is_empty());
         let shipped: Vec<String> = shipped.map(|path| format!("[{path}](../{path})")).collect();
         let cells = [
-            format!("{name}{}", claim.claim),
-            commands.join("<br>"),
+            format!("{name}{}<br>{}", claim.claim, commands.join("<br>")),
             claim.expected(),
             format!("{} ({})", claim.cpu_minutes, claim.processor),
             claim.needed(),
