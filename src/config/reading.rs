@@ -34,32 +34,28 @@ pub(crate) fn read<T: Serialize + DeserializeOwned + JsonSchema>(
     name: &str,
 ) -> Result<T, Error> {
     let text = text.trim_start_matches('\u{feff}');
-    let given = match format {
-        Format::Toml => toml::from_str::<Value>(text).ok(),
-        Format::Json => serde_json::from_str(text).ok(),
-    };
-    let settings = match format {
-        Format::Toml => toml::Deserializer::parse(text)
-            .map_err(|error| {
+    let (given, settings) = match format {
+        Format::Json => (serde_json::from_str(text).ok(), json_object(text)),
+        Format::Toml => match toml::from_str::<toml::Table>(text) {
+            Ok(root) => {
+                let root = toml::Value::Table(root);
+                // The same reader as for overrides: each further one would be compiled for every type.
+                let settings = serde_path_to_error::deserialize(root.clone());
+                let settings = settings.map_err(|error: serde_path_to_error::Error<_>| Refusal {
+                    line: line_of(text, &key_of(error.path())),
+                    path: Some(error.path().clone()),
+                    message: toml::de::Error::message(error.inner()).to_string(),
+                });
+                (serde_json::to_value(root).ok(), settings)
+            }
+            Err(error) => {
                 let message = half_a_number(text, error.span()).unwrap_or(error.message());
-                Refusal {
-                    line: line_at(text, error.span()),
-                    path: None,
-                    message: message.to_string(),
-                }
-            })
-            .and_then(|reader| {
-                serde_path_to_error::deserialize(reader).map_err(|error| {
-                    let line = line_at(text, error.inner().span());
-                    let message = error.inner().message().to_string();
-                    Refusal {
-                        line,
-                        path: Some(error.path().clone()),
-                        message,
-                    }
-                })
-            }),
-        Format::Json => json_object(text),
+                (
+                    None,
+                    Err(Refusal::new(line_at(text, error.span()), message)),
+                )
+            }
+        },
     };
     let settings = settings.map_err(|refusal| {
         let of_path = |path| mismatch::<T>(given.as_ref()?, path);
