@@ -2,6 +2,7 @@
 //! one run (`gallery:zero_one-1`) or a set (`gallery:zero_one`), and is read like a folder.
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 pub(crate) const PREFIX: &str = "gallery:";
 
@@ -23,101 +24,85 @@ pub const GATES: &str = "gallery:gates";
 /// All runs whose robots read digits.
 const ALL: &str = "gallery:all";
 
+/// The files of a run: their names and texts.
+type Files = Vec<(&'static str, &'static str)>;
+
 /// A run: its name, and its files with their names.
 type Run = (&'static str, &'static [(&'static str, &'static str)]);
 
 /// Runs that belong together: the name of the set, and at least one run.
 type Set = (&'static str, &'static [Run]);
 
-/// Makes a run of the files of a folder of `data/`.
-#[cfg(feature = "gallery")]
-macro_rules! files {
-    ($name:expr, $folder:expr, $($file:literal)*) => {
-        (
-            $name,
-            &[$(($file, include_str!(concat!("../../data/", $folder, "/", $file)))),*],
-        )
-    };
-}
-
-#[cfg(feature = "gallery")]
-macro_rules! run {
-    ($name:expr, $folder:expr) => {
-        files!($name, $folder, "run.json" "audit.json" "validation.json")
-    };
-}
-
-/// Makes runs named after their digits, from a folder of `data/`.
-#[cfg(feature = "gallery")]
-macro_rules! tasks {
-    ($folder:literal: $($task:literal)*) => {
-        &[$(run!(concat!("gallery:", $folder, "-", $task), concat!($folder, "/", $task))),*]
-    };
-}
-
-/// Runs provided at run time, where none ship.
-#[cfg(not(feature = "gallery"))]
-static PROVIDED: std::sync::OnceLock<Vec<Set>> = std::sync::OnceLock::new();
-
-/// All shipped runs. Those of a set are numbered by their seeds, or named after their digits.
-#[cfg(feature = "gallery")]
-const SETS: &[Set] = &[
-    (
-        ZERO_ONE,
-        &[
-            run!("gallery:zero_one-1", "trained/zero-one-1"),
-            run!("gallery:zero_one-2", "trained/zero-one-2"),
-            run!("gallery:zero_one-3", "trained/zero-one-3"),
-        ],
-    ),
-    (
-        // A robot for each of the paper's tasks of four digits.
-        "gallery:four_digit",
-        tasks!("four_digit": "0v123" "1v023" "2v013" "3v012" "01v23" "02v13" "03v12"),
-    ),
-    (
-        TEAM,
-        tasks!("team":
-            "0v1" "0v2" "0v3" "0v4" "0v5" "0v6" "0v7" "0v8" "0v9" "1v2" "1v3" "1v4" "1v5" "1v6" "1v7"
-            "1v8" "1v9" "2v3" "2v4" "2v5" "2v6" "2v7" "2v8" "2v9" "3v4" "3v5" "3v6" "3v7" "3v8" "3v9"
-            "4v5" "4v6" "4v7" "4v8" "4v9" "5v6" "5v7" "5v8" "5v9" "6v7" "6v8" "6v9" "7v8" "7v9" "8v9"
-        ),
-    ),
-    (
-        GAITS,
-        &[
-            files!("gallery:gaits-6", "gaits/seed-6", "run.json" "response.json"),
-            files!("gallery:gaits-1", "gaits/seed-1", "run.json" "response.json"),
-        ],
-    ),
-    (GATES, &[files!(GATES, "gates", "run.json" "audit.json")]),
-];
+/// All shipped runs, unpacked when they are first needed: those that `build.rs` packed, or, without
+/// the feature `gallery`, those that [`provide`] was given.
+static SETS: OnceLock<Vec<Set>> = OnceLock::new();
 
 /// Returns all runs that there are by name.
 fn sets() -> &'static [Set] {
     #[cfg(feature = "gallery")]
-    return SETS;
+    return SETS.get_or_init(|| unpacked(&packed()).expect("build.rs packed it"));
     #[cfg(not(feature = "gallery"))]
-    PROVIDED.get().map_or(&[], Vec::as_slice)
+    SETS.get().map_or(&[], Vec::as_slice)
 }
 
-/// A set of runs with the texts of their files, as [`exported`] passes it to [`provide`].
-type Exported = (String, Vec<(String, Vec<(String, String)>)>);
+/// Returns the shipped runs as text: all files behind lines that name them, as `build.rs` writes it.
+#[cfg(feature = "gallery")]
+fn packed() -> String {
+    use std::io::Read;
+    let packed: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/gallery.gz"));
+    let mut text = String::new();
+    flate2::read::GzDecoder::new(packed)
+        .read_to_string(&mut text)
+        .expect("build.rs packed text");
+    text
+}
+
+/// Reads the runs of a text that [`packed`] or [`exported`] made; `None` if it is something else.
+/// They are kept for as long as the program runs.
+fn unpacked(text: &str) -> Option<Vec<Set>> {
+    let leak = |text: &str| -> &'static str { text.to_string().leak() };
+    let mut sets: Vec<(&str, Vec<(&str, Files)>)> = Vec::new();
+    let mut rest = text;
+    while !rest.is_empty() {
+        let (line, after) = rest.split_once('\n')?;
+        rest = after;
+        let (kind, name) = line.split_once(' ')?;
+        match kind {
+            "set" => sets.push((leak(name), Vec::new())),
+            "run" => sets.last_mut()?.1.push((leak(name), Vec::new())),
+            "file" => {
+                let (name, bytes) = name.split_once(' ')?;
+                let (text, after) = rest.split_at_checked(bytes.parse().ok()?)?;
+                let files = &mut sets.last_mut()?.1.last_mut()?.1;
+                files.push((leak(name), leak(text)));
+                rest = after.strip_prefix('\n')?;
+            }
+            _ => return None,
+        }
+    }
+    let run = |(name, files): (&'static str, Vec<_>)| -> Run { (name, files.leak()) };
+    let set = |(name, runs): (&'static str, Vec<_>)| -> Set {
+        (name, runs.into_iter().map(run).collect::<Vec<Run>>().leak())
+    };
+    Some(sets.into_iter().map(set).collect())
+}
 
 /// Encodes what the static page needs of the shipped runs: robots, and their audits.
 #[cfg(feature = "gallery")]
 pub(crate) fn exported() -> String {
     let is_needed = |file: &str| ["run.json", "audit.json"].contains(&file);
-    let run = |(name, files): &Run| {
-        let files = files.iter().filter(|(file, _)| is_needed(file));
-        let files = files.map(|(file, text)| (file.to_string(), text.to_string()));
-        (name.to_string(), files.collect())
-    };
+    let mut text = String::new();
     // Gaits have no task, so the page does not offer them.
-    let sets = SETS.iter().filter(|(set, _)| *set != GAITS);
-    let sets = sets.map(|(set, runs)| (set.to_string(), runs.iter().map(run).collect()));
-    let sets: Vec<Exported> = sets.collect();
-    serde_json::to_string(&sets).expect("JSON has all of it")
+    for (set, runs) in sets().iter().filter(|(set, _)| *set != GAITS) {
+        text += &format!("set {set}\n");
+        for (run, files) in *runs {
+            text += &format!("run {run}\n");
+            for (file, content) in files.iter().filter(|(file, _)| is_needed(file)) {
+                text += &format!("file {file} {}\n{content}\n", content.len());
+            }
+        }
+    }
+    text
 }
 
 /// Provides the runs that [`exported`] encoded, for as long as the program runs, where none ship.
@@ -127,27 +112,12 @@ pub(crate) fn exported() -> String {
 /// Returns the reason if the text is something else.
 #[cfg(feature = "serve")]
 pub(crate) fn provide(text: &str) -> Result<(), String> {
-    let sets: Vec<Exported> = serde_json::from_str(text).map_err(|error| error.to_string())?;
-    #[cfg(not(feature = "gallery"))]
-    PROVIDED.get_or_init(|| sets.into_iter().map(kept).collect());
-    #[cfg(feature = "gallery")]
-    drop(sets);
+    let sets = unpacked(text).ok_or("expected the runs of a gallery")?;
+    // A build with runs of its own keeps those.
+    if cfg!(not(feature = "gallery")) {
+        SETS.get_or_init(|| sets);
+    }
     Ok(())
-}
-
-/// Keeps a set for as long as the program runs.
-#[cfg(not(feature = "gallery"))]
-fn kept((name, runs): Exported) -> Set {
-    let leak = |text: String| -> &'static str { text.leak() };
-    let run = |(name, files): (String, Vec<(String, String)>)| {
-        let files: Vec<_> = files
-            .into_iter()
-            .map(|(name, text)| (leak(name), leak(text)))
-            .collect();
-        (leak(name), &*files.leak())
-    };
-    let runs: Vec<Run> = runs.into_iter().map(run).collect();
-    (leak(name), &*runs.leak())
 }
 
 pub(crate) fn text(name: &str, file: &str) -> Option<&'static str> {
@@ -233,6 +203,27 @@ mod tests {
             "{error}"
         );
         assert_eq!(runs(TEAM).unwrap().len(), 45);
+    }
+
+    #[test]
+    fn what_is_exported_is_read_as_it_was_and_something_else_is_refused() {
+        let read = unpacked(&exported()).unwrap();
+        let names = |sets: &[Set]| -> Vec<&str> { sets.iter().map(|(set, _)| *set).collect() };
+        assert_eq!(
+            names(&read),
+            [ZERO_ONE, "gallery:four_digit", TEAM, GATES],
+            "all but the gaits"
+        );
+        let (_, runs) = read[2];
+        let (name, files) = runs[44];
+        assert_eq!((runs.len(), name), (45, "gallery:team-8v9"));
+        for (file, content) in files {
+            assert_eq!(text(name, file), Some(*content), "{file}");
+        }
+        let long = "set a\nrun b\nfile c 99\nshort\n";
+        for other in ["{}", "set", "run a\n", "set a\nfile b 1\nc\n", long] {
+            assert!(unpacked(other).is_none(), "{other}");
+        }
     }
 
     #[test]
