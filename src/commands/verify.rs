@@ -54,7 +54,7 @@ pub struct Claim {
     /// The way to measure it without `verify`, because it needs more than the program.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub by_hand: Option<ByHand>,
-    /// Processor time of all commands [min].
+    /// Processor time of all commands \[min\].
     pub cpu_minutes: f64,
     /// The processor on which that was measured.
     pub processor: String,
@@ -332,7 +332,7 @@ pub(crate) struct Verified {
     pub(crate) agreements: Vec<Agreement>,
     /// The error of a command that failed.
     pub(crate) error: Option<String>,
-    /// Wall-clock time [s].
+    /// Wall-clock time \[s\].
     pub(crate) seconds: f64,
 }
 
