@@ -154,7 +154,10 @@ Examples:
     #[command(after_help = reproduce::EXAMPLES)]
     Reproduce(ReproduceArgs),
     /// Run the commands behind the project's claims again, and compare.
-    #[command(after_help = verify::EXAMPLES)]
+    #[command(
+        after_help = verify::EXAMPLES,
+        override_usage = "morphcog verify [OPTIONS] <CLAIM>...\n       morphcog verify [OPTIONS] --quick | --all | --list"
+    )]
     Verify(VerifyArgs),
     /// Watch a robot: a GIF, a page for the browser, or a film.
     #[command(after_help = "\
