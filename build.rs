@@ -1,5 +1,5 @@
 //! Packs the runs that ship with the program (feature `gallery`) into one compressed file, which
-//! `src/shipped/gallery.rs` reads: a fifth of the program's size otherwise.
+//! `src/shipped/gallery.rs` reads: 1 MB of the program instead of 2.8.
 
 use flate2::Compression;
 use flate2::write::GzEncoder;

@@ -10,8 +10,6 @@ use crate::base::shell::quoted;
 use crate::base::text::duration;
 use crate::data::dataset::{Dataset, Split};
 use crate::data::files::{choose, places};
-use crate::shipped;
-use crate::shipped::atlas;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::ffi::OsString;
@@ -58,7 +56,7 @@ pub struct Claim {
     pub cpu_minutes: f64,
     /// The processor on which that was measured.
     pub processor: String,
-    /// The images and runs that it needs.
+    /// The images that it needs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub needs: Vec<Need>,
     /// True if it belongs to the quick selection.
@@ -109,8 +107,6 @@ pub struct Claimed {
 pub enum Need {
     /// MNIST.
     Mnist,
-    /// The runs in `data/atlas` of the repository.
-    Atlas,
 }
 
 impl Need {
@@ -118,7 +114,6 @@ impl Need {
     pub(crate) fn name(self) -> &'static str {
         match self {
             Need::Mnist => "MNIST",
-            Need::Atlas => "data/atlas",
         }
     }
 }
@@ -441,12 +436,6 @@ fn environment(
             .expect("it was loaded from there")
             .path;
         environment.push(("MORPHCOG_DATA", absolute(&folder)?.into_os_string()));
-    }
-    if needs(Need::Atlas) {
-        let run = Path::new("atlas:zero_one-1/run.json");
-        shipped::read_text(run).map_err(|error| Error::reading(run, &error))?;
-        let folder = shipped::atlas_of(run).expect("its run was read");
-        environment.push((atlas::VARIABLE, absolute(&folder)?.into_os_string()));
     }
     if let Some(threads) = session.threads {
         environment.push(("RAYON_NUM_THREADS", threads.to_string().into()));
