@@ -11,7 +11,9 @@ use nalgebra::DVector;
 /// Images with their groups (0 or 1), prepared for networks of a kind.
 #[derive(Clone, Debug)]
 pub(crate) struct Samples {
-    images: Vec<(Patches, usize)>,
+    images: Patches,
+    /// Group of each image.
+    groups: Vec<usize>,
     /// The networks' shape, except for their size.
     shape: Shape,
 }
@@ -53,11 +55,12 @@ impl Samples {
             activation,
             pooling,
         };
-        let images = images
-            .iter()
-            .map(|(image, group)| (shape.patches(image), *group))
-            .collect();
-        Ok(Samples { images, shape })
+        let (images, groups): (Vec<&Grid<f64>>, Vec<usize>) = images.iter().copied().unzip();
+        Ok(Samples {
+            images: shape.patches(&images),
+            groups,
+            shape,
+        })
     }
 }
 
@@ -69,13 +72,14 @@ fn test(
     session: &Session,
 ) -> Result<(f64, f64), Stopped> {
     let (mut correct, mut loss) = (0, 0.0);
-    for (image, group) in &samples.images {
+    let repeated = network.repeated(&samples.images);
+    for (image, group) in samples.groups.iter().enumerate() {
         session.check()?;
-        let outputs = network.forward(image);
+        let outputs = network.forward(&samples.images, image, &repeated);
         correct += usize::from(usize::from(outputs[1] > outputs[0]) == *group);
         loss += cross_entropy(outputs, *group).0;
     }
-    let accuracy = correct as f64 / samples.images.len() as f64;
+    let accuracy = correct as f64 / samples.groups.len() as f64;
     Ok((
         accuracy,
         if watch == Watch::Accuracy {
@@ -149,7 +153,7 @@ pub(crate) fn train(
     let parameters = network.parameters().len();
     let mut adam = Adam::new(hyper.learning_rate, parameters);
     let mut gradient = DVector::zeros(parameters);
-    let count = training.images.len();
+    let count = training.groups.len();
     let batch = if hyper.batch == 0 { count } else { hyper.batch };
     let mut best: Option<(f64, Option<DVector<f64>>)> = None;
     let mut waited = 0;
@@ -159,11 +163,12 @@ pub(crate) fn train(
     while done < epochs && waited < patience {
         for chosen in rng.sample(count, count).chunks(batch) {
             gradient.fill(0.0);
-            for (image, group) in chosen.iter().map(|index| &training.images[*index]) {
+            for &image in chosen {
                 session.check()?;
-                let (_, by_outputs) = cross_entropy(network.forward(image), *group);
+                let outputs = network.forward(&training.images, image, &[]);
+                let (_, by_outputs) = cross_entropy(outputs, training.groups[image]);
                 let by_outputs = by_outputs.map(|derivative| derivative / chosen.len() as f64);
-                network.backward(image, by_outputs, &mut gradient);
+                network.backward(&training.images, image, by_outputs, &mut gradient);
             }
             adam.step(network.parameters_mut(), &gradient);
         }
@@ -301,10 +306,11 @@ mod tests {
                     rng,
                 );
                 let mut adam = Adam::new(hyper.learning_rate, network.parameters().len());
-                for (image, group) in &images.images {
+                for (image, group) in images.groups.iter().enumerate() {
                     let mut gradient = DVector::zeros(network.parameters().len());
-                    let (_, by_outputs) = cross_entropy(network.forward(image), *group);
-                    network.backward(image, by_outputs, &mut gradient);
+                    let outputs = network.forward(&images.images, image, &[]);
+                    let (_, by_outputs) = cross_entropy(outputs, *group);
+                    network.backward(&images.images, image, by_outputs, &mut gradient);
                     adam.step(network.parameters_mut(), &gradient);
                 }
                 bits.extend(
