@@ -218,6 +218,22 @@ pub(crate) fn remove_half_written(folder: &Path, names: &[&str]) -> io::Result<(
 }
 
 /// Makes a rename in a folder durable. (Only Unix can sync a folder.)
+/// Runs `work` while no other process runs such work in the folder of a file, so that of two which
+/// read a file, add to it and write it, neither loses what the other adds. Some file systems cannot
+/// lock a folder; there it just runs.
+pub(crate) fn alone_beside<T>(file: &Path, work: impl FnOnce() -> T) -> T {
+    let folder = file
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    let lock = File::open(folder)
+        .ok()
+        .filter(|folder| folder.lock().is_ok());
+    let done = work();
+    drop(lock);
+    done
+}
+
 pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
     if cfg!(unix) {
         File::open(folder)?.sync_all()

@@ -3,7 +3,7 @@
 
 use crate::base::error::Error;
 use signal_hook::consts::{SIGINT, SIGTERM};
-use signal_hook::flag;
+use signal_hook::{SigId, flag, low_level};
 use std::ops::Deref;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -20,6 +20,8 @@ pub(crate) struct StopFlag {
     stop: Arc<AtomicBool>,
     /// The signal that set it last.
     signal: Arc<AtomicUsize>,
+    /// What was registered for it.
+    actions: Vec<SigId>,
     /// True if no other flag watched signals before.
     were_unused: bool,
 }
@@ -31,7 +33,7 @@ impl StopFlag {
         drop(self);
         if let Some(signal) = i32::try_from(signal).ok().filter(|signal| *signal > 0) {
             // A flag for it was registered a moment ago, so it can be raised.
-            let _ = signal_hook::low_level::raise(signal);
+            let _ = low_level::raise(signal);
         }
     }
 }
@@ -47,6 +49,10 @@ impl Drop for StopFlag {
     fn drop(&mut self) {
         if let Some(unused) = UNUSED.get() {
             unused.store(self.were_unused, Ordering::Relaxed);
+        }
+        // A signal that this flag has seen must not count as the first of two for a later flag.
+        for action in self.actions.drain(..) {
+            low_level::unregister(action);
         }
     }
 }
@@ -78,19 +84,22 @@ pub(crate) fn stop_flag() -> Result<StopFlag, Error> {
     let stop = Arc::new(AtomicBool::new(false));
     // In this order: the first SIGINT finds its flag unset and sets it, the second finds it set.
     let interrupted = Arc::new(AtomicBool::new(false));
-    flag::register_conditional_shutdown(SIGINT, AT_ONCE, Arc::clone(&interrupted))
-        .map_err(failed)?;
-    flag::register(SIGINT, interrupted).map_err(failed)?;
+    let mut actions = vec![
+        flag::register_conditional_shutdown(SIGINT, AT_ONCE, Arc::clone(&interrupted))
+            .map_err(failed)?,
+        flag::register(SIGINT, interrupted).map_err(failed)?,
+    ];
     let by = Arc::new(AtomicUsize::new(0));
     for signal in signals {
         let number = usize::try_from(signal).expect("signals are positive");
-        flag::register_usize(signal, Arc::clone(&by), number).map_err(failed)?;
-        flag::register(signal, Arc::clone(&stop)).map_err(failed)?;
+        actions.push(flag::register_usize(signal, Arc::clone(&by), number).map_err(failed)?);
+        actions.push(flag::register(signal, Arc::clone(&stop)).map_err(failed)?);
     }
     let were_unused = unused.swap(false, Ordering::Relaxed);
     Ok(StopFlag {
         stop,
         signal: by,
+        actions,
         were_unused,
     })
 }

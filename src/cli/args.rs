@@ -90,7 +90,7 @@ Exit codes:
   4    rollout unstable (simulate)
   5    run folder, dataset folder or port taken
   75   stopped by a signal, saved, can be resumed
-  130  stopped at once by a second Ctrl-C";
+  130  ended at once by Ctrl-C: the second, or the first with nothing to save";
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {

@@ -99,7 +99,11 @@ pub(super) fn run(args: DemoArgs, console: &Console) -> Result<(), Error> {
         train::train(&options, session)
     })
     .map_err(|error| match error.kind {
-        ErrorKind::Stopped => error.remedy(Remedy::Repeat),
+        // It resumes by itself.
+        ErrorKind::Stopped => Error {
+            remedies: vec![Remedy::Repeat],
+            ..error
+        },
         _ => error,
     })?;
     if !brief {

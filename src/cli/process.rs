@@ -94,6 +94,13 @@ fn say(help: &clap::Error, arguments: &[OsString]) -> u8 {
     let hides_any = arguments
         .iter()
         .any(|argument| argument.to_string_lossy().contains(is_unseen));
+    if help.use_stderr() && arguments.iter().any(|argument| argument == "--json") {
+        let text = help.to_string();
+        let message = text.split("\n\nUsage:").next().unwrap_or(&text);
+        let message = message.trim_start_matches("error: ").trim().to_string();
+        Console::new(Mode::Json).failed(&Error::usage(message));
+        return code;
+    }
     if help.use_stderr() && hides_any {
         let text = help.to_string();
         Console::new(Mode::Human).error(

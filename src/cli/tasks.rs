@@ -137,7 +137,7 @@ impl Command<'_> {
         std::fs::create_dir_all(out).map_err(|error| Error::writing(out, &error))?;
         let out = std::path::absolute(out).map_err(|error| Error::reading(out, &error))?;
         let (name, line, threads) = (self.name, self.line()?, self.with.threads.unwrap_or(1));
-        let (name, log) = (quoted(name), out.join("slurm-%a.log"));
+        let (name, log) = (quoted(name), out.join("slurm-%A-%a.log"));
         // Slurm reads these lines itself, without a shell's escapes.
         if [name.as_str(), &in_shell(&log)]
             .iter()
@@ -151,11 +151,15 @@ impl Command<'_> {
         }
         let first = count.min(MOST_OF_AN_ARRAY);
         if count > first {
+            let submit = |before: usize| {
+                let last = (count - before).min(first);
+                format!("sbatch --array=1-{last} --export=ALL,TASKS_BEFORE={before} job.sh")
+            };
+            let others: Vec<String> = (first..count).step_by(first).map(submit).collect();
             console.warning(&format!(
                 "{count} tasks are more than Slurm's arrays have by default (up to {first}, MaxArraySize - 1): the \
-                 script is for the first {first}. For those after them, submit it again, as in: \
-                 sbatch --array=1-{} --export=ALL,TASKS_BEFORE={first} job.sh",
-                (count - first).min(first)
+                 script is for the first {first}. For those after them, submit it again: {}",
+                others.join("; ")
             ));
         }
         console.text(&format!(

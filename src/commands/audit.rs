@@ -2,6 +2,7 @@
 
 use crate::analysis::verdict::Behaviour;
 use crate::base::error::Error;
+use crate::base::files::alone_beside;
 use crate::base::observer::Work;
 use crate::base::remedy::Remedy;
 use crate::base::session::Session;
@@ -187,13 +188,17 @@ pub fn audit(options: &AuditOptions, session: &Session) -> Result<AuditOutcome, 
             file.robots.retain(|before| before.id != found.id);
             file.robots.push(found);
         }
-        // Another audit of this run may have written meanwhile.
-        file.add_known(&options.out);
-        file.robots
-            .sort_by_key(|robot| order.iter().position(|id| *id == robot.id));
-        if ranks.leads() && !file.robots.is_empty() {
-            unwritten.tried(file.write(&options.out), session)?;
-        }
+        let written = alone_beside(&options.out, || {
+            // Another audit of this run may have written meanwhile.
+            file.add_known(&options.out);
+            file.robots
+                .sort_by_key(|robot| order.iter().position(|id| *id == robot.id));
+            match ranks.leads() && !file.robots.is_empty() {
+                true => file.write(&options.out),
+                false => Ok(()),
+            }
+        });
+        unwritten.tried(written, session)?;
         if stopped {
             return Ok(AuditOutcome {
                 called,
@@ -207,7 +212,13 @@ pub fn audit(options: &AuditOptions, session: &Session) -> Result<AuditOutcome, 
         }
     }
     if ranks.leads() {
-        unwritten.tried(file.write(&options.out), session)?;
+        let written = alone_beside(&options.out, || {
+            file.add_known(&options.out);
+            file.robots
+                .sort_by_key(|robot| order.iter().position(|id| *id == robot.id));
+            file.write(&options.out)
+        });
+        unwritten.tried(written, session)?;
     }
     Ok(AuditOutcome {
         called,

@@ -24,6 +24,7 @@ use crate::store::run::RunFile;
 use crate::store::setting::{RunRef, RunSetting};
 use crate::store::trainings::Trainings;
 use crate::store::unwritten::Unwritten;
+use crate::task::class_names::ClassNames;
 use crate::task::fitness::Group;
 use crate::task::grouping::{self};
 use rayon::prelude::*;
@@ -69,7 +70,8 @@ pub fn capacity(options: &CapacityOptions, session: &Session) -> Result<Capacity
     replaced::<CapacityFile>(&options.out)?;
     let robots = robots(&report, options)?;
     let images = Images::of(&report, setting, (&options.eval, config), session)?;
-    let grouping = setting.task.grouping()?;
+    let names = ClassNames::of(&setting.data.class_names);
+    let grouping = setting.task.grouping()?.named(&names);
     let of_split = |split: &grouping::ClassSplit| -> Vec<&RobotReport> {
         robots
             .iter()
@@ -99,7 +101,7 @@ pub fn capacity(options: &CapacityOptions, session: &Session) -> Result<Capacity
         program_version: env!("CARGO_PKG_VERSION").to_string(),
         run: report.run.clone(),
         eval_sha256: Some(report.fingerprint()),
-        selected: report.selected.clone(),
+        selected: report.selection(),
         dataset: report.dataset.clone(),
         patience_on: if config.clean { "validation" } else { "test" }.to_string(),
         trainings: config.trainings,

@@ -300,12 +300,16 @@ fn to_csv<'a>(comparison: &'a Comparison) -> Vec<u8> {
         "p",
         "p_adjusted",
     ];
-    let keys = comparison.keys.iter().map(|key| key.key.as_str());
+    // Columns of their own have these already.
+    let keys = || {
+        let is_own = |key: &str| OF_RUN.contains(&key);
+        comparison.keys.iter().filter(move |key| !is_own(&key.key))
+    };
     let columns = OF_RUN
         .into_iter()
         .chain(OF_TEST)
         .chain(OF_DIFFERENCE)
-        .chain(keys);
+        .chain(keys().map(|key| key.key.as_str()));
     let row = |(number, tested): (usize, Option<&'a ComparedAccuracy>)| {
         let run = &comparison.runs[number];
         let of_run = (
@@ -338,8 +342,7 @@ fn to_csv<'a>(comparison: &'a Comparison) -> Vec<u8> {
             found.map(|found| found.p),
             found.map(|found| found.p_adjusted),
         );
-        let keys = comparison.keys.iter();
-        let keys: Vec<&str> = keys.map(|key| key.texts[number].as_str()).collect();
+        let keys: Vec<&str> = keys().map(|key| key.texts[number].as_str()).collect();
         (of_run, of_test, of_difference, keys)
     };
     let rows = (0..comparison.runs.len()).flat_map(|number| {

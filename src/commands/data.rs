@@ -58,10 +58,6 @@ pub(crate) fn info(
     })
 }
 
-/// The contact sheet in the folder of an imported dataset.
-#[cfg(all(feature = "import", feature = "figures"))]
-const SHEET_PNG: &str = "sheet.png";
-
 /// Makes a dataset of pictures, arrays or tables, with a contact sheet of its training images.
 ///
 /// # Errors
@@ -90,7 +86,7 @@ fn draw_sheet(staged: &import::Staged, name: &str) -> Result<(), Error> {
     let sheet =
         sheet::contact_sheet(&dataset, Split::Train, SAMPLES).and_then(|sheet| sheet::png(&sheet));
     match sheet {
-        Ok(png) => staged.write(SHEET_PNG, &png),
+        Ok(png) => staged.write(import::SHEET_PNG, &png),
         // Of many classes of large images there is none.
         Err(sheet::SheetError::Size { .. }) => Ok(()),
         Err(error) => Err(Error::other(error.to_string())),

@@ -152,7 +152,7 @@ pub(crate) fn known(options: &EvalOptions, session: &Session) -> Result<Option<E
         options.draw(&opened.config),
     )?;
     let is_it = !known.stopped
-        && known.head() == opened.report(options, &shown)
+        && known.head() == opened.report(options, &shown).head()
         && is_of_robots(&known, &opened.sources, options)?;
     Ok(is_it.then_some(known))
 }

@@ -68,7 +68,8 @@ impl EvolveOutcome {
 /// `stop` is set, it drops the current generation and saves the state before it.
 ///
 /// # Errors
-/// Returns an error if config, data or folder is unsuitable. No existing results are lost.
+/// Returns an error if config, data or folder is unsuitable. No existing results are lost, except
+/// those that it is to replace ([`IfExists::Overwrite`]).
 pub fn evolve(options: &EvolveOptions, session: &Session) -> Result<EvolveOutcome, Error> {
     let resumes = options.if_exists == IfExists::Resume;
     // Check everything that can be known before anything is written.

@@ -260,7 +260,11 @@ pub(crate) fn measure(of: &Gaits, session: &Session) -> Result<(), Error> {
             error: 0.0,
             seed: None,
         };
-        let found = response::measure(&options, session)?;
+        let (found, none) = response::measure_any(&options, session)?;
+        if let Some(error) = none {
+            // An earlier call measured the others.
+            session.observer.warning(&format!("{error}; left out"));
+        }
         if found.stopped {
             return Err(Stopped.into());
         }

@@ -52,10 +52,12 @@ pub(crate) struct Experiment {
 const LEAST: [usize; 2] = [100, 5];
 
 impl PaperPlan {
-    /// Returns true if a name means the built-in plan, and no file.
+    /// Returns true if a name means the built-in plan, and no file. An empty file is none: the shell
+    /// has made it for `morphcog config NAME > NAME`.
     pub(crate) fn is_built_in(name: &str) -> bool {
         let own = PAPER_TOML.0;
-        (name == own || own.strip_suffix(".toml") == Some(name)) && !Path::new(name).exists()
+        (name == own || own.strip_suffix(".toml") == Some(name))
+            && std::fs::metadata(name).map_or(true, |found| found.is_file() && found.len() == 0)
     }
 
     /// Returns the plan as TOML, with the value of every key.
@@ -69,6 +71,7 @@ impl PaperPlan {
         let text = match read_given(Path::new(name)) {
             Err(_) if PaperPlan::is_built_in(name) => PAPER_TOML.1.to_string(),
             Err(error) => return Err(Error::reading(Path::new(name), &error)),
+            Ok(_) if PaperPlan::is_built_in(name) => PAPER_TOML.1.to_string(),
             Ok(text) => text,
         };
         let format = reading::Format::of(Path::new(name));

@@ -19,6 +19,7 @@ use crate::store::eval::EvalFile;
 use crate::store::folder;
 use crate::store::names::METRICS;
 use crate::store::names::{CAPACITY_JSON, EVAL_JSON, FigureFormat, RUN_JSON};
+use crate::store::results::making;
 use crate::store::run::{RunFile, different};
 use crate::store::stored_run::StoredRun;
 use std::fmt;
@@ -439,7 +440,7 @@ fn of_run(wanted: &PlotOptions, path: &Path) -> Result<Figure, Error> {
         "capacity"
     };
     let with_maker = |error: Error| match error.remedies.is_empty() {
-        true => error.remedy(Remedy::Run(Invocation::new(maker), "makes it")),
+        true => error.remedy(Remedy::Run(making(maker, path), "makes it")),
         false => error,
     };
     match kind {
@@ -474,7 +475,7 @@ fn of_run(wanted: &PlotOptions, path: &Path) -> Result<Figure, Error> {
                         "{}: it is about the robots of another run",
                         beside.display()
                     );
-                    let remedy = Remedy::Run(Invocation::new("capacity"), "makes that of this run");
+                    let remedy = Remedy::Run(making("capacity", path), "makes that of this run");
                     return Err(Error::input(text).remedy(remedy));
                 }
                 file.run = run.called().to_string();

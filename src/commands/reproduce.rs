@@ -172,7 +172,9 @@ impl Job<'_> {
         let Some((chosen, audited)) = self.chosen(&sources)? else {
             return Ok(None);
         };
-        let (tasks, grouping) = (&sources[0].run.dimensions.tasks, config.grouping()?);
+        // The runs know the names of the classes, which their plan need not have.
+        let first = &sources[0].run;
+        let (tasks, grouping) = (&first.dimensions.tasks, first.config.grouping()?);
         let tasks: Vec<&String> = tasks
             .iter()
             .filter(|task| {

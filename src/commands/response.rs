@@ -2,6 +2,7 @@
 //! the accuracy that training could reach.
 
 use crate::base::error::{Error, ErrorKind};
+use crate::base::files::alone_beside;
 use crate::base::observer::Work;
 use crate::base::remedy::Remedy;
 use crate::base::session::Session;
@@ -121,6 +122,18 @@ impl ResponseOutcome {
 /// # Errors
 /// Returns an error if an option, the run or the data are unsuitable, or no robot can be measured.
 pub fn measure(options: &ResponseOptions, session: &Session) -> Result<ResponseOutcome, Error> {
+    let (found, none) = measure_any(options, session)?;
+    match none {
+        Some(error) => Err(error),
+        None => Ok(found),
+    }
+}
+
+/// Acts as [`measure`], but also returns the error if no robot can be measured.
+pub(crate) fn measure_any(
+    options: &ResponseOptions,
+    session: &Session,
+) -> Result<(ResponseOutcome, Option<Error>), Error> {
     check_numbers(options)?;
     let provenance = provenance(options)?;
     let config = &provenance.config;
@@ -232,45 +245,52 @@ pub fn measure(options: &ResponseOptions, session: &Session) -> Result<ResponseO
             Err(error) => return Err(error),
         }
         if !file.robots.is_empty() || !file.unfinished.is_empty() {
-            // Another process may have measured robots of this run meanwhile.
-            let before = replaced::<ResponseFile>(&options.out);
-            let whole = before
-                .map(|before| before.map_or_else(|| file.clone(), |b| file.with_others_of(&b)));
             let is_new = |id: &str| file.robots.iter().any(|robot| robot.id == id);
             let outdated = asked.iter().zip(&drawn).filter(|(id, _)| is_new(id));
             let outdated: Vec<[PathBuf; 3]> = outdated.map(|(_, files)| files.clone()).collect();
-            let written = whole.and_then(|whole| whole.write(&options.out, &outdated));
+            let written = alone_beside(&options.out, || {
+                // Another process may have measured robots of this run meanwhile.
+                let before = replaced::<ResponseFile>(&options.out)?;
+                let whole = before.map_or_else(|| file.clone(), |b| file.with_others_of(&b));
+                whole.write(&options.out, &outdated)
+            });
             unwritten.tried(written, session)?;
         }
         if stopped {
             break;
         }
     }
-    if file.robots.is_empty() && !stopped {
-        return Err(match refused.as_slice() {
-            [one] => one.clone().remedy(Remedy::ChooseRobots(None)),
-            several => {
-                let text = format!(
-                    "none of the {} chosen robots can be measured: {}",
-                    several.len(),
-                    several[0]
-                );
-                Error::input(text).remedy(Remedy::ChooseRobots(None))
-            }
-        });
+    let none = (file.robots.is_empty() && !stopped).then(|| match refused.as_slice() {
+        [one] => one.clone().remedy(Remedy::ChooseRobots(None)),
+        several => {
+            let text = format!(
+                "none of the {} chosen robots can be measured: {}",
+                several.len(),
+                several[0]
+            );
+            Error::input(text).remedy(Remedy::ChooseRobots(None))
+        }
+    });
+    if none.is_none() {
+        let left_out = |error: &Error| session.observer.warning(&format!("{error}; left out"));
+        refused.iter().for_each(left_out);
     }
-    refused
+    // Named by all that were asked for, so that a stop leaves no other names.
+    let is_measured = |id: &str| file.robots.iter().any(|robot| robot.id == id);
+    let pictures = asked
         .iter()
-        .for_each(|error| session.observer.warning(&format!("{error}; left out")));
-    let ids: Vec<&str> = file.robots.iter().map(|robot| robot.id.as_str()).collect();
-    let pictures = pictures(&options.out, &ids);
-    Ok(ResponseOutcome {
+        .zip(drawn)
+        .filter(|(id, _)| is_measured(id))
+        .map(|(_, files)| files)
+        .collect();
+    let found = ResponseOutcome {
         called: provenance.called,
         pictures,
         file,
         stopped,
         unwritten: unwritten.error(),
-    })
+    };
+    Ok((found, none))
 }
 
 fn check_numbers(options: &ResponseOptions) -> Result<(), Error> {

@@ -168,6 +168,11 @@ pub fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutcome, Err
             .map_or_else(|| vec![None; images.len()], Member::walks)
     });
     let mut walks: Vec<Vec<Walk>> = walks.collect();
+    let is_ours = |member: &Member| {
+        robots.iter().any(|chosen| {
+            (&member.id, &member.run_sha256) == (&chosen.robot.id, &hashes[chosen.source])
+        })
+    };
     let mut done = walks.iter().flatten().flatten().count() as u64;
     let total = (robots.len() * images.len()) as u64;
     let kept = match done {
@@ -232,14 +237,14 @@ pub fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutcome, Err
         }
         if written.elapsed() >= WRITE_EVERY {
             file.members = members(&walks);
-            unwritten.tried(write(options, &file, session), session)?;
+            unwritten.tried(write(options, &file, is_ours, session), session)?;
             written = Instant::now();
         }
     }
     file.members = members(&walks);
     if stopped {
         if !file.members.is_empty() {
-            unwritten.tried(write(options, &file, session), session)?;
+            unwritten.tried(write(options, &file, is_ours, session), session)?;
         }
         return Ok(TeamOutcome {
             file,
@@ -249,7 +254,7 @@ pub fn team(options: &TeamOptions, session: &Session) -> Result<TeamOutcome, Err
     file.baselines =
         pool.install(|| baselines(&file, (&sources, &robots, &splits), &dataset, split))?;
     file.answers = Some(file.decided());
-    unwritten.tried(write(options, &file, session), session)?;
+    unwritten.tried(write(options, &file, is_ours, session), session)?;
     Ok(TeamOutcome {
         file,
         unwritten: unwritten.error(),
@@ -444,9 +449,18 @@ fn known(options: &TeamOptions, now: &TeamFile) -> Result<Vec<Member>, Error> {
     Ok(earlier.map_or(Vec::new(), |file| file.members))
 }
 
-/// Writes the results so far; sets those of another test in the file aside.
-fn write(options: &TeamOptions, file: &TeamFile, session: &Session) -> Result<(), Error> {
-    let is_same = || TeamFile::read(&options.out).is_ok_and(|known| is_same(&known, file));
+/// Writes the results so far; sets those of another test in the file aside, and those of a team with
+/// a member that this one lacks.
+fn write(
+    options: &TeamOptions,
+    file: &TeamFile,
+    is_ours: impl Fn(&Member) -> bool,
+    session: &Session,
+) -> Result<(), Error> {
+    let is_same = || {
+        TeamFile::read(&options.out)
+            .is_ok_and(|known| is_same(&known, file) && known.members.iter().all(is_ours))
+    };
     results::make_room(&options.out, is_same, session)?;
     file.write(&options.out)
 }

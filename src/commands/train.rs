@@ -81,7 +81,8 @@ impl TrainOutcome {
 ///
 /// # Errors
 /// Returns an error if the archive, an option, the data or the folder is unsuitable, or if it was
-/// stopped ([`IfExists::Resume`] continues it). No existing results are lost.
+/// stopped ([`IfExists::Resume`] continues it). No existing results are lost,
+/// except those that it is to replace ([`IfExists::Overwrite`]).
 pub fn train(options: &TrainOptions, session: &Session) -> Result<TrainOutcome, Error> {
     if options.robots.validated().is_some() {
         let text = "expected another selection: gaits have no task to validate";

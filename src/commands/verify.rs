@@ -509,7 +509,7 @@ fn run(
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     let failed = |error: std::io::Error| Error::other(format!("a command cannot run: {error}"));
-    let mut child = command.spawn().map_err(failed)?;
+    let mut child = Running(command.spawn().map_err(failed)?);
     let path = folder.join(EVENTS);
     let mut events = Events::open(&path)?;
     let mut relay = Relay {
@@ -519,10 +519,10 @@ fn run(
     let mut is_stopped = false;
     let status = loop {
         if session.stop.load(Ordering::Relaxed) && !is_stopped {
-            stop(&mut child);
+            stop(&mut child.0);
             is_stopped = true;
         }
-        let status = child.try_wait().map_err(failed)?;
+        let status = child.0.try_wait().map_err(failed)?;
         for event in events
             .more()
             .map_err(|error| Error::reading(&path, &error))?
@@ -535,6 +535,19 @@ fn run(
         std::thread::sleep(POLL);
     };
     Ok((status, events.all))
+}
+
+/// A command that ends with this value, so that an error here leaves none behind.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        if !matches!(self.0.try_wait(), Ok(Some(_))) {
+            // Nothing helps against an error here.
+            let _ = self.0.kill();
+            let _ = self.0.wait();
+        }
+    }
 }
 
 fn stop(child: &mut Child) {

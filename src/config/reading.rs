@@ -385,6 +385,9 @@ fn set<T: JsonSchema>(root: &mut toml::Value, assignment: &str) -> Result<(), St
     let Some((key, text)) = parts.filter(|(key, _)| !key.is_empty()) else {
         return Err("expected key=value, as in map_elites.parents=10".to_string());
     };
+    if assignment.contains(['\n', '\r']) {
+        return Err("expected one line".to_string());
+    }
     if key.split('.').count() > DEEPEST {
         return Err(format!(
             "expected a key of at most {DEEPEST} parts, as in map_elites.parents=10"

@@ -240,10 +240,7 @@ pub(crate) fn test_images(
                 .map(|class| count_of(&class))
                 .min()
                 .unwrap_or(0);
-            let advice = format!(
-                "ask for at most {} images, or for all",
-                most * classes.len()
-            );
+            let advice = format!("ask for at most {} images", most * classes.len());
             Error::input(error.to_string()).advice(advice)
         })?;
         images.extend(drawn.into_iter().map(|index| ImageRef { index, label }));

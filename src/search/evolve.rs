@@ -35,7 +35,7 @@ pub(crate) struct Files {
 impl Files {
     /// Writes metrics, checkpoint, `run.json` and `elites.csv`.
     pub(crate) fn save(&mut self, run: &Run) -> Result<(), Error> {
-        self.metrics.flush()?;
+        self.metrics.sync()?;
         run.save(&self.folder)
     }
 }

@@ -11,14 +11,14 @@ use std::path::Path;
 /// The metrics of a run so far: `metrics.csv`, thinned.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Course {
-    pub(crate) done: usize,
+    pub(crate) done: u64,
     pub(crate) asked: u64,
     /// True if a process is working on the run.
     pub(crate) under_way: bool,
     /// The estimated seconds for the rest, at the pace of the last fifth.
     pub(crate) seconds_left: Option<f64>,
     /// The generations of the curves' points.
-    pub(crate) generation: Vec<usize>,
+    pub(crate) generation: Vec<u64>,
     pub(crate) qd_score: Vec<f64>,
     /// The share of cells that are filled.
     pub(crate) coverage: Vec<f64>,
@@ -38,19 +38,20 @@ impl Course {
         } else {
             Vec::new()
         };
-        let done = moments.len();
-        let left = asked.saturating_sub(done as u64);
-        // Extrapolates from its last fifth.
-        let fifth = (done / 5).max(1);
-        let since = done
+        // Some of the first may be missing, if the run went on from its run.json.
+        let done = moments.last().map_or(0, |last| last.generation + 1);
+        let left = asked.saturating_sub(done);
+        // Extrapolates from the last fifth.
+        let known = moments.len();
+        let fifth = (known / 5).max(1);
+        let since = known
             .checked_sub(fifth + 1)
-            .map(|before| moments[done - 1].seconds - moments[before].seconds);
+            .map(|before| moments[known - 1].seconds - moments[before].seconds);
         let seconds_left = since
             .filter(|_| left > 0)
             .map(|seconds| seconds / fifth as f64 * left as f64);
-        let generation = thinned(done);
-        let of =
-            |value: fn(&Moment) -> f64| generation.iter().map(|k| value(&moments[*k])).collect();
+        let points: Vec<&Moment> = thinned(known).into_iter().map(|k| &moments[k]).collect();
+        let of = |value: fn(&Moment) -> f64| points.iter().map(|moment| value(moment)).collect();
         Ok(Course {
             done,
             asked,
@@ -58,17 +59,39 @@ impl Course {
             seconds_left,
             qd_score: of(|moment| moment.qd_score),
             coverage: of(|moment| moment.coverage),
-            obj_max: generation.iter().map(|k| moments[*k].obj_max).collect(),
-            generation,
+            obj_max: points.iter().map(|moment| moment.obj_max).collect(),
+            generation: points.iter().map(|moment| moment.generation).collect(),
         })
     }
 }
 
-/// Returns up to [`POINTS`] generations, evenly spaced, including the last.
-fn thinned(done: usize) -> Vec<usize> {
-    match done {
+/// Returns the indices of up to [`POINTS`] of so many lines, evenly spaced, including the last.
+fn thinned(lines: usize) -> Vec<usize> {
+    match lines {
         0 => Vec::new(),
-        done if done <= POINTS => (0..done).collect(),
-        done => (0..POINTS).map(|k| k * (done - 1) / (POINTS - 1)).collect(),
+        lines if lines <= POINTS => (0..lines).collect(),
+        lines => (0..POINTS)
+            .map(|k| k * (lines - 1) / (POINTS - 1))
+            .collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn generations_are_those_of_the_lines_even_if_the_first_are_missing() {
+        let folder = tempfile::tempdir().unwrap();
+        let line = |generation: u64| {
+            format!("{generation},3,0.5,7,0.1,4,2,20,20,0,0,0,0,0,{generation}\n")
+        };
+        let header = "generation,num_elites,coverage,qd_score,norm_qd_score,obj_max,obj_mean,evaluations,simulated,saved,\
+                      saved_known_bodies,saved_early_stop,saved_shared_rollouts,unstable,seconds\n";
+        let lines: String = (9000..9010).map(line).collect();
+        std::fs::write(folder.path().join(METRICS), format!("{header}{lines}")).unwrap();
+        let course = Course::of(&folder.path().join("run.json"), 9020).unwrap();
+        assert_eq!((course.done, course.generation[0]), (9010, 9000));
+        assert_eq!(course.seconds_left, Some(10.0));
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::base::error::Error;
 use crate::base::files::write_atomically;
+use crate::base::remedy::Remedy;
 use crate::serve::Service;
 use crate::serve::assets::{ASSETS, ENGINE, PAGE};
 use crate::serve::local::Local;
@@ -19,6 +20,9 @@ const SIMULATOR: &[u8] = include_bytes!("page/simulator.gz");
 /// Control steps of the walk by which a browser finds out whether it gives the program's bits.
 const PINNED_STEPS: u32 = 50;
 
+/// The name of that walk's file.
+const PINNED: &str = "pinned.json";
+
 /// The documentation's first page, if there is documentation in the site's folder.
 const DOCUMENTATION: &str = "docs/index.html";
 
@@ -27,7 +31,7 @@ const DOCUMENTATION: &str = "docs/index.html";
 /// (`docs/index.html`), the page links to it.
 ///
 /// # Errors
-/// Returns an error if a file cannot be written.
+/// Returns an error if a file cannot be written, or is there and not of an earlier site.
 pub(crate) fn write(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     std::fs::create_dir_all(folder).map_err(|error| Error::writing(folder, &error))?;
     let engine = include_str!("page/engine_local.js");
@@ -41,7 +45,14 @@ pub(crate) fn write(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     files.push(("worker.js", include_bytes!("page/worker.js").to_vec()));
     files.push(("simulator.gz", SIMULATOR.to_vec()));
     files.push(("gallery.gz", compressed(gallery::exported().as_bytes())));
-    files.push(("pinned.json", pinned()?.to_string().into_bytes()));
+    files.push((PINNED, pinned()?.to_string().into_bytes()));
+    // No other page has this file.
+    let is_site = folder.join(PINNED).exists();
+    let mut paths = files.iter().map(|(name, _)| folder.join(name));
+    if let Some(other) = paths.find(|path| !is_site && path.exists()) {
+        let text = format!("{}: is there, and not of an earlier site", other.display());
+        return Err(Error::occupied(text).remedy(Remedy::MoveAway));
+    }
     let written = |(name, bytes): (&str, Vec<u8>)| {
         let path = folder.join(name);
         match write_atomically(&path, &bytes) {

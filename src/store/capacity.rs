@@ -228,14 +228,18 @@ impl CapacityFile {
     }
 }
 
-/// Returns a capacity with its interval for people: "17 (14–21)", "< 1", "no match (38 or more)".
+/// Returns a capacity with its interval for people: "17 (14–21)", "< 1", "< 1 (up to any size)", "no
+/// match (38 or more)".
 pub(crate) fn spoken(capacity: Option<Crossing>, interval: Option<[Option<f64>; 2]>) -> String {
     let whole = |size: f64| number::fixed(size, 0);
+    let is_below = matches!(capacity, Some(Crossing::Below { .. }));
     let capacity = capacity.map_or_else(|| "no match".to_string(), |size| size.to_string());
     match interval {
         Some([Some(low), Some(high)]) if whole(low) != whole(high) => {
             format!("{capacity} ({}–{})", whole(low), whole(high))
         }
+        // The interval's lower end is below the smallest size, too.
+        Some([Some(_), None]) if is_below => format!("{capacity} (up to any size)"),
         Some([Some(low), None]) => format!("{capacity} ({} or more)", whole(low)),
         _ => capacity,
     }

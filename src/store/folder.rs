@@ -95,11 +95,10 @@ impl RunFolder {
         remove_half_written(path, &RunFolder::files())
             .map_err(|error| Error::writing(path, &error))?;
         if if_exists == IfExists::Overwrite {
-            // An unchanged config stays, with its author's comments.
-            for name in RunFolder::files()
-                .into_iter()
-                .filter(|name| *name != CONFIG)
-            {
+            // An unchanged config stays, with its author's comments. Checkpoints, which are last,
+            // go first: without the rest, they would revive a run.
+            let files = RunFolder::files().into_iter().rev();
+            for name in files.filter(|name| *name != CONFIG) {
                 let file = path.join(name);
                 match std::fs::remove_file(&file) {
                     Err(error) if error.kind() != std::io::ErrorKind::NotFound => {

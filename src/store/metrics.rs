@@ -138,6 +138,14 @@ impl Metrics {
         let written = ownership::check(&self.path).and_then(|()| self.file.flush());
         written.map_err(|error| Error::writing(&self.path, &error))
     }
+
+    /// Writes all lines so that they outlast a power failure: a checkpoint that has more of the run
+    /// than this file could not restore them.
+    pub(crate) fn sync(&mut self) -> Result<(), Error> {
+        self.flush()?;
+        let written = self.file.get_ref().sync_data();
+        written.map_err(|error| Error::writing(&self.path, &error))
+    }
 }
 
 /// A line of `metrics.csv`, reduced to what figures need.

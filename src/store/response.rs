@@ -380,21 +380,23 @@ impl ResponseFile {
     /// estimates for another task.
     pub(crate) fn with_others_of(&self, earlier: &ResponseFile) -> Self {
         let mut all = self.clone();
+        // Known robots keep their places, so that the order does not depend on stops.
+        all.robots.clear();
         if earlier.is_of(
             &self.run_sha256,
             self.setting.seed,
             &self.setting.conditions,
         ) {
-            let is_other =
-                |robot: &&RobotResponse| self.robots.iter().all(|own| own.id != robot.id);
-            for robot in earlier.robots.iter().filter(is_other) {
+            for robot in &earlier.robots {
+                let own = self.robots.iter().find(|own| own.id == robot.id);
                 let taught = robot
                     .taught
                     .filter(|_| earlier.setting.asks_as(&self.setting));
-                all.robots.push(RobotResponse {
+                let other = || RobotResponse {
                     taught,
                     ..robot.clone()
-                });
+                };
+                all.robots.push(own.cloned().unwrap_or_else(other));
             }
             let is_open = |robot: &&Unfinished| {
                 let ended = self.robots.iter().map(|own| &own.id);
@@ -404,6 +406,11 @@ impl ResponseFile {
             };
             all.unfinished
                 .extend(earlier.unfinished.iter().filter(is_open).cloned());
+        }
+        for own in &self.robots {
+            if all.robots.iter().all(|robot| robot.id != own.id) {
+                all.robots.push(own.clone());
+            }
         }
         all
     }

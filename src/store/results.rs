@@ -8,6 +8,7 @@ use crate::base::remedy::{Invocation, Remedy};
 use crate::base::session::Session;
 use crate::config::reading;
 use crate::shipped::read_text;
+use crate::store::names::{EVAL_JSON, RUN_JSON};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::io;
@@ -34,11 +35,26 @@ pub(crate) fn read<T: Stored>(path: &Path, maker: Option<&'static str>) -> Resul
         Some(command) => Error::reading_or(
             path,
             &error,
-            Remedy::Run(Invocation::new(command), "makes one"),
+            Remedy::Run(making(command, path), "makes one"),
         ),
         None => Error::reading(path, &error),
     })?;
     parse(&text, &path.display().to_string())
+}
+
+/// Returns the command that makes a file beside a run or, for networks, beside an evaluation.
+pub(crate) fn making(command: &'static str, path: &Path) -> Invocation {
+    let (archive, make) = (path.with_file_name(RUN_JSON), Invocation::new(command));
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty());
+    match folder.filter(|_| archive.exists()) {
+        Some(_) if command == "capacity" => {
+            make.option("eval", path.with_file_name(EVAL_JSON).as_path())
+        }
+        Some(folder) => make.option("archive", folder),
+        None => make,
+    }
 }
 
 /// Parses the text of a file; `name` appears in messages.
@@ -93,7 +109,8 @@ pub(crate) fn make_room(
         name.push(path.extension().unwrap_or_default());
         path.with_file_name(name)
     };
-    for path in [path, &path.with_extension("csv")] {
+    // The table first: without its results, a kill in between leaves both to the next attempt.
+    for path in [&path.with_extension("csv"), path] {
         match ownership::check(path).and_then(|()| std::fs::rename(path, aside(path))) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => {
                 return Err(Error::writing(path, &error));

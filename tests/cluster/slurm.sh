@@ -74,8 +74,8 @@ EOF
   sbatch job.sh
   finished 240 || { cat runs/plan/slurm-*.log; exit 1; }
   same "$work/slurm/runs/plan" "Slurm, tasks killed" || { cat runs/plan/slurm-*.log; exit 1; }
-  grep -q 'stopped; ' limit/runs/slurm-1.log || { cat limit/runs/slurm-1.log; exit 1; }
+  grep -q 'stopped; ' limit/runs/slurm-*-1.log || { cat limit/runs/slurm-*-1.log; exit 1; }
   morphcog sweep limit/plan.toml --set 'seeds=[1]' --out limit/runs --status | tee status | grep '1 task: 1 done' > /dev/null ||
-    { cat status limit/runs/slurm-1.log; tail -n 40 slurmctld.log slurmd.log; exit 1; }
-  echo "Slurm: stopped before the time limit $(grep -c 'stopped; ' limit/runs/slurm-1.log) times, requeued, done ($((SECONDS - begin)) s)"
+    { cat status limit/runs/slurm-*-1.log; tail -n 40 slurmctld.log slurmd.log; exit 1; }
+  echo "Slurm: stopped before the time limit $(grep -c 'stopped; ' limit/runs/slurm-*-1.log) times, requeued, done ($((SECONDS - begin)) s)"
 fi

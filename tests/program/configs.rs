@@ -77,6 +77,18 @@ fn a_file_in_this_folder_comes_before_the_built_in_config_of_its_name() {
     );
 }
 
+/// `morphcog config zero_one.toml > zero_one.toml` begins with an empty file of the shell's.
+#[test]
+fn an_empty_file_of_the_name_of_a_built_in_config_does_not_hide_it() {
+    let sandbox = Sandbox::new();
+    for name in ["zero_one.toml", "paper.toml"] {
+        let printed = sandbox.run(&format!("config {name}")).ended(0, &[]).out;
+        sandbox.write(name, "");
+        let again = sandbox.run(&format!("config {name}")).ended(0, &[]).out;
+        assert!(!printed.is_empty() && again == printed, "{name}: {again}");
+    }
+}
+
 #[test]
 fn a_folder_of_the_name_of_a_built_in_config_does_not_hide_it() {
     let sandbox = Sandbox::new();
@@ -314,6 +326,7 @@ fn a_wrong_set_is_refused_with_2_and_quotes_it() {
     for (set, words) in [
         ("seed", "key=value"),
         ("=3", "--set =3"),
+        ("seed=7\ngenerations=5", "one line"),
         ("sed=3", "sed"),
         ("seed=x", "seed=x"),
         ("seed.x=3", "seed"),

@@ -102,6 +102,12 @@ fn every_shipped_gate_is_physical_and_walks_the_right_way_under_all_four_inputs(
     let eval: serde_json::Value = serde_json::from_str(&sandbox.read("eval.json")).unwrap();
     let tested = eval["robots"].as_array().unwrap();
     assert_eq!(tested.len(), GATES.len());
+    // Networks of tasks whose classes have names.
+    sandbox
+        .run("capacity --eval eval.json --set trainings=2 --set sizes=[1,4]")
+        .ended(0, &[]);
+    let networks: serde_json::Value = serde_json::from_str(&sandbox.read("capacity.json")).unwrap();
+    assert_eq!(networks["tasks"].as_array().unwrap().len(), GATES.len());
     for robot in tested {
         assert_eq!(
             (&robot["images"], &robot["accuracy"]),

@@ -52,6 +52,26 @@ fn no_table_shows_a_minus_nothing() {
     }
 }
 
+#[test]
+fn an_error_of_the_command_line_is_an_event_too() {
+    let sandbox = Sandbox::new();
+    for command in [
+        "--json eval -n 0",
+        "serve --json --port 80000",
+        "--json nothing",
+    ] {
+        let said = sandbox.run(command).ended(2, &[]);
+        let events = said.json_lines();
+        assert_eq!(events.len(), 1, "{said:?}");
+        assert_eq!(events[0]["event"], "error", "{said:?}");
+        let message = events[0]["message"].as_str().unwrap();
+        assert!(
+            !message.is_empty() && !message.contains("Usage"),
+            "{message}"
+        );
+    }
+}
+
 // On Linux, where no thread is left: see `no_threads`.
 #[cfg(not(target_os = "linux"))]
 #[test]

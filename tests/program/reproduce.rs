@@ -66,10 +66,11 @@ fn all_steps_are_done_and_a_second_call_has_nothing_left_to_do() {
     let cells: Vec<&str> = table.lines().nth(1).unwrap().split(',').collect();
     assert_eq!((table.lines().count(), cells[0]), (2, "0|1"));
     assert!(cells[1].parse::<usize>().unwrap() <= 2);
-    sandbox
+    let again = sandbox
         .run("reproduce plan.toml --scale 0.5 --out small --threads 3")
         .ended(0, &[]);
     assert_eq!(results(&sandbox, "small"), first);
+    assert!(said.err.contains("test images") && !again.err.contains("test images"));
     // A larger scale goes on with what there is.
     sandbox
         .run("reproduce plan.toml --scale 1 --out small")

@@ -353,10 +353,11 @@ fn a_file_keeps_what_it_has_of_other_robots() {
     ));
     assert!(!said.ended(0, &[]).out.contains(&ids[0]));
     let file = responses(&sandbox, "run/response.json");
-    let [second, first] = &file.robots[..] else {
+    let [first, second] = &file.robots[..] else {
         panic!("{} robots", file.robots.len())
     };
-    assert_eq!((&second.id, &first.id), (&ids[1], &ids[0]));
+    // In the order in which they were measured first.
+    assert_eq!((&first.id, &second.id), (&ids[0], &ids[1]));
     let measured = |id: &str| both.robots.iter().find(|robot| robot.id == id).unwrap();
     assert_eq!(second.displacements, measured(&ids[1]).displacements);
     assert_eq!(first.displacements, measured(&ids[0]).displacements);

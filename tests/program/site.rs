@@ -384,3 +384,17 @@ fn the_page_links_to_documentation_that_lies_in_its_folder() {
     assert!(page.find("<footer>") < page.find(link));
     assert_eq!(sandbox.read("public/docs/index.html"), "documentation");
 }
+
+#[test]
+fn only_files_of_an_earlier_site_are_replaced() {
+    let sandbox = Sandbox::new();
+    sandbox.write("mine/index.html", "my page");
+    sandbox
+        .run("site mine")
+        .ended(5, &["mine/index.html: is there"]);
+    assert_eq!(sandbox.read("mine/index.html"), "my page");
+    sandbox.run("site public").ended(0, &[]);
+    sandbox.write("public/about.txt", "mine");
+    sandbox.run("site public").ended(0, &[]);
+    assert_eq!(sandbox.read("public/about.txt"), "mine");
+}

@@ -967,15 +967,16 @@ fn a_job_that_cannot_be_queued_again_says_what_to_do() {
 #[test]
 fn more_tasks_than_slurm_takes_are_said_with_what_to_do() {
     let sandbox = Sandbox::tiny();
-    let seeds: Vec<String> = (1..=1100).map(|seed: u32| seed.to_string()).collect();
+    let seeds: Vec<String> = (1..=2100).map(|seed: u32| seed.to_string()).collect();
     sandbox.write(
         "plan.toml",
         SHORT.replace("[1, 2]", &format!("[{}]", seeds.join(","))),
     );
     let words = [
-        "1100 tasks",
+        "2100 tasks",
         "MaxArraySize",
-        "sbatch --array=1-100 --export=ALL,TASKS_BEFORE=1000",
+        "sbatch --array=1-1000 --export=ALL,TASKS_BEFORE=1000 job.sh",
+        "sbatch --array=1-100 --export=ALL,TASKS_BEFORE=2000 job.sh",
     ];
     let script = sandbox.run("sweep plan.toml --slurm").ended(0, &words).out;
     assert!(script.contains("#SBATCH --array=1-1000\n"), "{script}");

@@ -444,7 +444,7 @@ fn robots_that_know_other_classes_are_left_out_of_a_team() {
 }
 
 #[test]
-fn a_second_test_on_other_images_keeps_the_first() {
+fn a_second_test_on_other_images_or_without_a_member_keeps_the_first() {
     let sandbox = pairs();
     sandbox.run(&format!("{TEAM} -q --images 6")).ended(0, &[]);
     let first = sandbox.read("pairs/team.json");
@@ -460,5 +460,16 @@ fn a_second_test_on_other_images_keeps_the_first() {
         files(&sandbox.path("pairs"))
             .values()
             .any(|content| content == first.as_bytes())
+    );
+    let whole = sandbox.read("pairs/team.json");
+    let smaller = TEAM.replace(" pairs/1v4", "");
+    sandbox
+        .run(&format!("{smaller} --images 6 --seed 2"))
+        .ended(0, &["(12 of 12 walks known", "pairs/team.json"]);
+    assert_eq!(read(&sandbox, "pairs/team.json").members.len(), 2);
+    assert!(
+        files(&sandbox.path("pairs"))
+            .values()
+            .any(|content| content == whole.as_bytes())
     );
 }

@@ -458,10 +458,11 @@ pub(crate) fn evaluation(
         console.line("");
     }
     console.line(&format!(
-        "{} {} {} images; {}; |d| up to {} voxel lengths is wrong",
+        "{} {} {} images, {} control steps each; {}; |d| up to {} voxel lengths is wrong",
         report.images.len(),
         report.dataset,
         report.split,
+        report.control_steps,
         report.selection(),
         report.threshold
     ));

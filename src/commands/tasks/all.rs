@@ -103,9 +103,12 @@ pub(crate) fn check_data<'a>(
             dataset,
             dir,
             builtin,
+            transpose,
+            class_names,
             ..
         } = &config.data;
-        let name = format!("{:?}", (splits, dataset, dir, builtin, &whereabouts));
+        let about = (dataset, dir, builtin, transpose, class_names);
+        let name = format!("{:?}", (splits, about, &whereabouts));
         let dataset = match datasets.entry(name.clone()) {
             Entry::Occupied(loaded) => loaded.into_mut(),
             Entry::Vacant(place_of) => place_of.insert(whereabouts.load(&config.data, splits)?),

@@ -135,6 +135,9 @@ pub struct Refused {
     pub source: String,
     /// The reason.
     pub reason: String,
+    /// The class that the source gives it, if that is known.
+    #[serde(skip)]
+    pub(crate) label: Option<Label>,
 }
 
 impl Refused {
@@ -142,6 +145,14 @@ impl Refused {
         Refused {
             source: shortened(&source.into(), 200),
             reason: shortened(reason.as_ref(), 200),
+            label: None,
+        }
+    }
+
+    pub(crate) fn of(self, label: &Label) -> Self {
+        Refused {
+            label: Some(label.clone()),
+            ..self
         }
     }
 }

@@ -45,6 +45,9 @@ use std::path::{Path, PathBuf};
 /// The table of the images' sources, in a dataset's folder.
 pub(crate) const IMAGES_CSV: &str = "images.csv";
 
+/// The name of the picture with some images of each class.
+pub(crate) const SHEET_PNG: &str = "sheet.png";
+
 /// Most pixels of a picture that is kept between the two readings.
 const FEW_PIXELS: usize = 1 << 14;
 
@@ -255,8 +258,17 @@ pub(crate) fn stage(
             .next()
             .map(|label| format!("{label}"))
             .unwrap_or_default();
+        let refused = match found.refused.as_slice() {
+            [] => String::new(),
+            [first, ..] => format!(
+                "; {} cannot be read: {} {}",
+                counted(found.refused.len(), "other", "others"),
+                first.source,
+                first.reason
+            ),
+        };
         return Err(Error::input(format!(
-            "all images are of one class, {only}: expected two or more"
+            "all images are of one class, {only}: expected two or more{refused}"
         )));
     }
     let notes = classes.changed.iter().map(|[before, after]| {
@@ -443,7 +455,7 @@ fn look(found: &mut Found, options: &ImportOptions, session: &Session) -> Result
         .observer
         .begins(&Work::new(label, total as u64, "images"));
     let see = |mut item: Item| -> Result<Read, Refused> {
-        let failed = |reason: String| Refused::new(item.source.clone(), reason);
+        let failed = |reason: String| Refused::new(item.source.clone(), reason).of(&item.label);
         let grey = decoded(&item, options).map_err(failed)?;
         let facts = Facts::of(&grey).map_err(failed)?;
         let is_small = grey.pixels.len() <= FEW_PIXELS && !matches!(item.picture, Picture::Grey(_));
@@ -500,10 +512,19 @@ fn check_classes_left(found: &Found, read: &[Read], classes: &Classes) -> Result
         Some((label, _)) => {
             let text = format!("no image of the class {label} can be read");
             let folder = label.to_string();
-            let is_of = |refused: &&Refused| refused.source.split('/').any(|name| name == folder);
-            let first = found.refused.iter().find(is_of).or(found.refused.first());
-            let why = first.map(|refused| format!("; {} {}", refused.source, refused.reason));
-            Err(Error::input(text + &why.unwrap_or_default()))
+            let is_of = |refused: &&Refused| match &refused.label {
+                Some(own) => own == label,
+                None => refused.source.split('/').any(|name| name == folder),
+            };
+            let why = match (found.refused.iter().find(is_of), found.refused.first()) {
+                (Some(own), _) => format!("; {} {}", own.source, own.reason),
+                (None, Some(other)) => format!(
+                    "; of those that cannot be read, {} {}",
+                    other.source, other.reason
+                ),
+                (None, None) => String::new(),
+            };
+            Err(Error::input(text + &why))
         }
     }
 }
@@ -1102,12 +1123,45 @@ mod tests {
         assert!(!data.unwrap().is_transposed());
     }
 
+    #[cfg(unix)]
+    #[test]
+    fn links_that_lead_back_are_not_followed() {
+        use std::os::unix::fs::symlink;
+        let place = Place::with_bars(3);
+        let plain = place.import_with(&["pictures"], &place.options("plain"));
+        let plain = plain.unwrap();
+        symlink("../up", place.at("pictures/up/again")).unwrap();
+        symlink("../..", place.at("pictures/up/above")).unwrap();
+        symlink(".", place.at("pictures/here")).unwrap();
+        symlink("../across", place.at("pictures/up/other")).unwrap();
+        symlink("../up", place.at("pictures/across/other")).unwrap();
+        let linked = place.import_with(&["pictures"], &place.options("linked"));
+        let count = |imported: &Imported| -> Vec<usize> {
+            let classes = imported.classes.iter();
+            classes.map(|class| class.train + class.test).collect()
+        };
+        // Each class has the pictures of the other one, once.
+        let both: usize = count(&plain).iter().sum();
+        assert_eq!(count(&linked.unwrap()), [both, both]);
+    }
+
     #[test]
     fn sources_without_a_dataset_are_refused_and_nothing_is_left() {
         let place = Place::with_bars(3);
         let (pixels, labels) = numbers(4);
         place.refused(&["none"], "none: cannot be read");
         place.refused(&["pictures/up"], "no subfolder for each class");
+        // The row of a class itself is named, not that of another.
+        place.put(
+            "flat.csv",
+            b"1,0,9,300,0\n2,0,0,0,0\n1,0,9,200,0\n1,0,9,200,7\n",
+        );
+        place.refused(&["flat.csv"], "the class 2 can be read; flat.csv:2");
+        place.put("bad.csv", b"1,0,9,300,0\n2,0,0,0,0\n");
+        place.refused(
+            &["bad.csv"],
+            "1 other cannot be read: bad.csv:1 has \"300\"",
+        );
         place.put("empty/readme", b"x");
         place.refused(&["empty"], "expected a folder with one subfolder");
         place.refused(
@@ -1246,17 +1300,21 @@ mod tests {
         with(|_| ()).unwrap();
         assert_eq!(with(|_| ()).unwrap_err().kind, ErrorKind::Occupied);
         with(|options| options.force = true).unwrap();
-        // The pictures themselves are never replaced.
-        place.put("pictures/dataset.json", b"{}");
-        let onto = ImportOptions {
-            to: Some(place.at("pictures")),
-            force: true,
-            ..place.options("own")
-        };
-        assert_eq!(
-            place.import_with(&["pictures"], &onto).unwrap_err().kind,
-            ErrorKind::Usage
-        );
+        // Sources and other files are never replaced.
+        place.put("pictures/up/dataset.json", b"{}");
+        for (source, folder, kind) in [
+            ("out/own", "out/own", ErrorKind::Usage),
+            ("pictures", "pictures", ErrorKind::Occupied),
+            ("pictures", "pictures/up", ErrorKind::Occupied),
+        ] {
+            let onto = ImportOptions {
+                to: Some(place.at(folder)),
+                force: true,
+                ..place.options("own")
+            };
+            let error = place.import_with(&[source], &onto).unwrap_err();
+            assert_eq!(error.kind, kind, "{folder}");
+        }
         assert!(place.at("pictures/up/0.png").exists());
     }
 

@@ -112,8 +112,13 @@ fn array(name: &str, source: &mut impl Read) -> Result<Array, String> {
     let bytes = each
         .zip(count)
         .and_then(|(each, count)| each.checked_mul(count));
-    let (Some(bytes), Some(count)) = (bytes.filter(|&bytes| bytes as u64 <= MOST_BYTES), count)
-    else {
+    // A text has an address and two lengths in memory, however short it is.
+    let of_texts = if "US".contains(kind.kind) { 24 } else { 0 };
+    let fits = |bytes: &usize| {
+        let texts = count.unwrap_or(0).saturating_mul(of_texts);
+        bytes.saturating_add(texts) as u64 <= MOST_BYTES
+    };
+    let (Some(bytes), Some(count)) = (bytes.filter(fits), count) else {
         return Err(format!("has a shape of {shape:?}, more than 2 GB"));
     };
     // Texts of length 0 take no bytes however many there are.
@@ -352,6 +357,13 @@ mod tests {
             let error = read(&bytes).unwrap_err();
             assert!(error.contains(said), "{said}: {error}");
         }
+    }
+
+    #[test]
+    fn texts_are_limited_by_what_they_take_in_memory() {
+        let many = npy("|S1", "False", "(400000000,)", b"");
+        let error = read(&many).unwrap_err();
+        assert!(error.contains("more than 2 GB"), "{error}");
     }
 
     #[test]

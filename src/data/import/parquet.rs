@@ -8,8 +8,9 @@ use parquet::file::metadata::{FileMetaData, RowGroupMetaData};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::{Field, Row};
 use parquet::schema::types::Type;
+use std::cell::Cell;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, Once};
 
 /// Names of the columns, if there are several that could be meant.
 const IMAGES: [&str; 2] = ["image", "img"];
@@ -18,11 +19,32 @@ const LABELS: [&str; 4] = ["label", "labels", "fine_label", "class"];
 /// Reads the images of a file; `name` is its path below the source.
 pub(crate) fn read(path: &Path, name: &str, part: Option<Part>) -> Result<Found, Error> {
     // The library panics at some broken files; none leaves anything behind.
-    let read = std::panic::catch_unwind(|| rows(path, name, part));
+    let read = quietly(|| std::panic::catch_unwind(|| rows(path, name, part)));
     read.unwrap_or_else(|_| {
         let text = format!("{}: is no whole Parquet file", path.display());
         Err(Error::input(text))
     })
+}
+
+thread_local! {
+    static IS_QUIET: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Runs `work` without a report of its panics on this thread.
+fn quietly<T>(work: impl FnOnce() -> T) -> T {
+    static HOOKED: Once = Once::new();
+    HOOKED.call_once(|| {
+        let usual = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |about| {
+            if !IS_QUIET.get() {
+                usual(about);
+            }
+        }));
+    });
+    let before = IS_QUIET.replace(true);
+    let done = work();
+    IS_QUIET.set(before);
+    done
 }
 
 fn rows(path: &Path, name: &str, part: Option<Part>) -> Result<Found, Error> {

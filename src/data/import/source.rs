@@ -112,6 +112,21 @@ fn entry(path: &Path) -> Entry {
     }
 }
 
+/// True if a path in a folder is a link to a folder on the way there, so that it leads to itself.
+fn leads_back(path: &Path, folder: &Path) -> bool {
+    let is_link = path
+        .symlink_metadata()
+        .is_ok_and(|about| about.is_symlink());
+    is_link
+        && path.canonicalize().is_ok_and(|target| {
+            folder
+                .ancestors()
+                .filter_map(|on_the_way| on_the_way.canonicalize().ok())
+                .any(|real| real.starts_with(&target))
+        })
+}
+
+/// Lists a folder, without links that lead back.
 fn list(folder: &Path) -> Result<Listing, Error> {
     let failed = |error: std::io::Error| Error::reading(folder, &error);
     let mut listing = Listing {
@@ -126,6 +141,7 @@ fn list(folder: &Path) -> Result<Listing, Error> {
         }
         let path = found.path();
         match path.is_dir() {
+            true if leads_back(&path, folder) => {}
             true => listing.folders.push(Entry { name, path }),
             false => listing.files.push(Entry { name, path }),
         }

@@ -4,6 +4,7 @@ use crate::base::error::Error;
 use crate::base::files::{sync_folder, write_atomically};
 use crate::base::remedy::Remedy;
 use crate::data::description::DATASET_JSON;
+use crate::data::import::{IMAGES_CSV, SHEET_PNG};
 use std::path::{Path, PathBuf};
 
 /// A folder beside the one that is wanted, removed on drop unless it has taken its place.
@@ -27,20 +28,25 @@ pub(crate) fn check_free(target: &Path, force: bool) -> Result<(), Error> {
         return Err(Error::occupied(format!("{place}: there is a file")).remedy(Remedy::MoveAway));
     }
     let entries = std::fs::read_dir(target).map_err(|error| Error::reading(target, &error))?;
-    let names: Vec<String> = entries
-        .flatten()
-        .map(|entry| entry.file_name().to_string_lossy().into_owned())
-        .collect();
-    let is_dataset = names
-        .iter()
-        .any(|name| name == DATASET_JSON || name.contains("-images"));
-    match (names.is_empty(), force) {
+    let entries: Vec<std::fs::DirEntry> = entries.flatten().collect();
+    let is_of_dataset = |entry: &std::fs::DirEntry| {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let is_idx = name.trim_end_matches(".gz").ends_with("-ubyte");
+        // The last is a file manager's.
+        let is_known = [DATASET_JSON, IMAGES_CSV, SHEET_PNG, ".DS_Store"].contains(&name.as_str());
+        (is_known || is_idx) && !entry.path().is_dir()
+    };
+    match (entries.is_empty(), force) {
         (true, _) => Ok(()),
-        (false, true) if is_dataset => Ok(()),
-        (false, true) => {
-            let text = format!("{place}: has files, but none of a dataset: it is not replaced");
-            Err(Error::occupied(text).remedy(Remedy::MoveAway))
-        }
+        (false, true) => match entries.iter().find(|entry| !is_of_dataset(entry)) {
+            None => Ok(()),
+            Some(other) => {
+                let other = other.file_name().to_string_lossy().into_owned();
+                let text =
+                    format!("{place}: has {other}, which no dataset has: it is not replaced");
+                Err(Error::occupied(text).remedy(Remedy::MoveAway))
+            }
+        },
         (false, false) => Err(Error::occupied(format!("{place}: is there already"))
             .remedy(Remedy::Replace)
             .advice("give it another name")),
@@ -206,6 +212,9 @@ mod tests {
                 "{name}"
             );
         }
+        // A folder of datasets is none itself.
+        std::fs::create_dir(at("set/cat-images")).unwrap();
+        assert!(check_free(&at("set"), true).is_err());
         std::fs::create_dir(at("empty")).unwrap();
         assert!(check_free(&at("empty"), false).is_ok() && check_free(&at("none"), false).is_ok());
         std::fs::write(at("file"), "x").unwrap();

@@ -113,12 +113,13 @@ fn table(
         let (label, count, side) = match columns {
             Some(known) => known,
             None => {
-                let label = label_column(&record).unwrap_or(0);
+                let named = label_column(&record);
+                let label = named.unwrap_or(0);
                 let side = side(record.len()).ok_or_else(|| {
                     Error::input(format!("{place}: {}", wrong_columns(record.len())))
                 })?;
                 columns = Some((label, record.len(), side));
-                if is_header(&record, label) {
+                if is_header(&record, label) || counts_up(&record, named) {
                     continue;
                 }
                 (label, record.len(), side)
@@ -206,6 +207,22 @@ fn is_header(record: &csv::ByteRecord, label: usize) -> bool {
     pixels.clone().count() > 0 && pixels.all(|(_, field)| is_word(field))
 }
 
+/// Returns true for a row that numbers the columns, but for the one called the label, as pandas does
+/// with columns without names. No image has such pixels and such a label.
+fn counts_up(record: &csv::ByteRecord, named: Option<usize>) -> bool {
+    let columns = record
+        .iter()
+        .enumerate()
+        .filter(|(column, _)| Some(*column) != named);
+    let numbers: Option<Vec<usize>> = columns
+        .map(|(_, field)| std::str::from_utf8(field).ok()?.parse().ok())
+        .collect();
+    numbers.is_some_and(|numbers| {
+        (named.is_some() || numbers[0] == 0)
+            && numbers.windows(2).all(|pair| pair[0] + 1 == pair[1])
+    })
+}
+
 fn number(field: &[u8]) -> Option<f32> {
     std::str::from_utf8(field).ok()?.parse().ok()
 }
@@ -287,6 +304,9 @@ mod tests {
             ("pixel0,pixel1,pixel2,pixel3,Label\n0,1,2,255,7\n", 2),
             ("\u{feff}7;0;1;2;255\n", 1),
             ("7.0\t0\t1.0\t2\t255\n", 1),
+            // As pandas numbers columns, with and without a name for the label.
+            ("0,1,2,3,label\n0,1,2,255,7\n", 2),
+            ("0,1,2,3,4\n7,0,1,2,255\n", 2),
         ] {
             let (label, pixels, source) = first(text);
             assert_eq!((label, pixels), expected, "{text}");

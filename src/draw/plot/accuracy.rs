@@ -13,6 +13,9 @@ use std::collections::BTreeSet;
 /// Up to so many robots each have a line with a name; with more, lines are thin and nameless.
 const NAMED: usize = 40;
 
+/// Control steps per image of the paper's test, which a figure need not name.
+const USUAL_STEPS: u32 = 500;
+
 /// Plots the accuracy of every robot on test or validation images with its 95 % interval, a block
 /// per task, with the mean and the baselines, which need no body.
 pub(crate) fn accuracy(report: &EvalFile, style: &Style) -> Figure {
@@ -83,7 +86,13 @@ pub(crate) fn accuracy(report: &EvalFile, style: &Style) -> Figure {
         y += 3.0;
     }
     let images = report.robots.first().map_or(0, |robot| robot.images);
-    let name = format!("accuracy on {images} {} images [%]", report.dataset);
+    let name = match report.control_steps {
+        USUAL_STEPS => format!("accuracy on {images} {} images [%]", report.dataset),
+        steps => format!(
+            "accuracy on {images} {} images, {steps} steps each [%]",
+            report.dataset
+        ),
+    };
     plot.lower_axis(&mut canvas, Some(&name));
     let below = top + all + AXIS + 4.0;
     let height = legend(&mut canvas, report, below) + MARGIN;

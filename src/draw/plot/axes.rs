@@ -271,12 +271,16 @@ pub(crate) fn colour_bar(
     colour_of: impl Fn(f64) -> Colour,
 ) -> f64 {
     const STEPS: u32 = 64;
-    const LINE: f64 = 9.5;
+    const LINE_HEIGHT: f64 = 9.5;
     let lines = canvas.font().lines(name, TEXT, false, room, 3);
     for (k, line) in lines.iter().enumerate() {
-        canvas.text([x, y - 3.0 + LINE * k as f64], line, TextStyle::default());
+        canvas.text(
+            [x, y - 3.0 + LINE_HEIGHT * k as f64],
+            line,
+            TextStyle::default(),
+        );
     }
-    let further = LINE * (lines.len() - 1) as f64;
+    let further = LINE_HEIGHT * (lines.len() - 1) as f64;
     let y = y + further;
     let size = [width, 6.0];
     for k in 0..STEPS {
@@ -309,6 +313,8 @@ pub(crate) fn colour_bar(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::draw::plot::Style;
+    use crate::draw::plot::canvas::{Element, Ink};
 
     #[test]
     fn axes_end_on_ticks_that_people_use() {
@@ -364,5 +370,24 @@ mod tests {
             ["-12", "600000", "-1234.5", "0.50", "0"].map(grouped),
             ["−12", "600,000", "−1,234.5", "0.50", "0"]
         );
+    }
+
+    #[test]
+    fn ticks_of_a_colour_bar_are_as_thin_as_those_of_axes() {
+        let mut canvas = Canvas::new(&Style::default());
+        let axis = Axis::exact(-5.0, 5.0, 3);
+        colour_bar(&mut canvas, [0.0; 2], [100.0; 2], &axis, "fitness", |_| {
+            colour::INK
+        });
+        let width = |element: &Element| match element {
+            Element::Path {
+                ink: Ink::Line(pen),
+                ..
+            } => Some(pen.width),
+            _ => None,
+        };
+        let widths: Vec<f64> = canvas.elements().iter().filter_map(width).collect();
+        assert!(widths.len() >= axis.ticks().len());
+        assert!(widths.iter().all(|width| *width <= LINE), "{widths:?}");
     }
 }

@@ -40,7 +40,7 @@ pub(crate) fn gates(all: &[GateWalks], of: &str, style: &Style) -> Figure {
         style.page(),
     ) + 2.0;
     let columns = style.panels(COLUMNS);
-    let panel = (style.page() - 2.0 * MARGIN - GAP * (columns - 1) as f64) / COLUMNS as f64;
+    let panel = (style.page() - 2.0 * MARGIN - GAP * (columns - 1) as f64) / columns as f64;
     let side = (panel - CUES - 6.0) / 2.0;
     let tall = WORDS + side + CUES + 5.0 * ROW + GAP;
     for (number, gate) in all.iter().enumerate() {

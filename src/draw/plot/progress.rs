@@ -100,7 +100,9 @@ pub(crate) fn progress(runs: &[Progress], style: &Style) -> Figure {
         plot.lower_axis(&mut canvas, (k + 1 == count).then_some("evaluations"));
         top += PANEL + 9.0;
     }
-    let mut height = top - 9.0 + AXIS + MARGIN;
+    // Below the axis's name where there is no room beside it.
+    let narrow = if style.column() < 220.0 { 10.0 } else { 0.0 };
+    let mut height = top - 9.0 + AXIS + narrow + MARGIN;
     let note = TextStyle {
         size: TEXT,
         ..TextStyle::end()

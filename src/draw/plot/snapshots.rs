@@ -133,8 +133,9 @@ fn suitable(walk: &Walk) -> usize {
 /// Returns the leftmost and rightmost x from the start of a phase, and the highest y.
 fn reach(walk: &Walk, phase: usize) -> [f64; 3] {
     let frames = walk.phase_frames(phase);
-    let zero = walk.centre(frames.start)[0];
+    let [zero, start] = walk.centre(frames.start);
     let size = walk.recording().body.width() as f64 + 2.0;
+    let height = walk.recording().body.height() as f64;
     let all = walk.extent(frames.clone());
     let centres = || frames.clone().map(|frame| walk.centre(frame)[0] - zero);
     // A body that is thrown apart does not decide the scale.
@@ -143,8 +144,7 @@ fn reach(walk: &Walk, phase: usize) -> [f64; 3] {
     [
         low,
         high,
-        all.top
-            .min(2.0 * walk.recording().body.height() as f64 + 2.0),
+        all.top.min((2.0 * height).max(start + height) + 2.0),
     ]
 }
 
@@ -221,6 +221,16 @@ mod tests {
                 .size()[0],
             PAGE
         );
+    }
+
+    #[test]
+    fn a_robot_that_starts_high_up_is_not_above_the_figure() {
+        let mut recording = simulated("34/56", 1, 5, false);
+        for frame in &mut recording.frames {
+            frame.points.iter_mut().for_each(|point| point[1] += 40.0);
+            frame.centre[1] += 40.0;
+        }
+        assert!(reach(&Walk::new(&recording).unwrap(), 0)[2] > 41.0);
     }
 
     #[test]

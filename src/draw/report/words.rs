@@ -6,6 +6,7 @@ use crate::base::number;
 use crate::base::number::percent;
 use crate::base::remedy::{Invocation, Value};
 use crate::base::shell::in_shell;
+use crate::base::text::counted;
 use crate::config::capacity::CapacityConfig;
 use crate::config::train::TrainConfig;
 use crate::config::{Config, Settings, flatten};
@@ -232,16 +233,17 @@ pub(super) fn methods(dossier: &Dossier) -> String {
         };
         let means: Vec<String> = report.means.iter().map(mean).collect();
         text += &format!(
-            " On {} held-out {}{} images, with displacements up to {} voxel lengths counted as wrong, {} robots \
-             ({}) reached a mean accuracy of {}.",
+            " On {} held-out {}{} images, for {} control steps each and with displacements up to {} voxel lengths \
+             counted as wrong, {} ({}) reached a mean accuracy of {}.",
             report.images.len(),
             report
                 .trained_on
                 .as_ref()
                 .map_or(String::new(), |_| format!("{} ", report.dataset)),
             report.split,
+            report.control_steps,
             report.threshold,
-            report.robots.len(),
+            counted(report.robots.len(), "robot", "robots"),
             report.selection(),
             means.join(", ")
         );
