@@ -110,15 +110,8 @@ pub(crate) fn run(cli: Cli, console: &Console, ranks: Ranks) -> Result<(), Error
         Command::Config {
             name: Some(name),
             set,
-        } if PaperPlan::is_built_in(&name) => {
-            console.text(&PaperPlan::load(&name, &set)?.to_toml());
-            Ok(())
-        }
-        Command::Config {
-            name: Some(name),
-            set,
         } => {
-            console.text(&Config::load(&name, &set)?.to_toml());
+            console.text(&printed_config(&name, &set)?);
             Ok(())
         }
         Command::Schema { name: None } => {
@@ -205,6 +198,21 @@ fn reported<T>(
         .ranks(ranks)
         .data(data);
     work(&session)
+}
+
+/// Returns a config or plan as TOML. An empty file does not count: the shell has made it for
+/// `morphcog config NAME > NAME`.
+fn printed_config(name: &str, set: &[String]) -> Result<String, Error> {
+    let is_empty = std::fs::metadata(name).is_ok_and(|file| file.is_file() && file.len() == 0);
+    let built_in = config::BUILT_IN.iter().find(|(own, _)| *own == name);
+    match built_in.filter(|_| is_empty) {
+        Some((_, text)) => Ok(Config::parse(text, name, set)?.to_toml()),
+        None if is_empty && name == PAPER_TOML.0 => {
+            Ok(PaperPlan::parse(PAPER_TOML.1, name, set)?.to_toml())
+        }
+        None if PaperPlan::is_built_in(name) => Ok(PaperPlan::load(name, set)?.to_toml()),
+        None => Ok(Config::load(name, set)?.to_toml()),
+    }
 }
 
 fn run_evolve(args: EvolveArgs, console: &Console, ranks: Ranks) -> Result<(), Error> {

@@ -2,7 +2,7 @@
 
 use crate::base::ownership::{self, folder_of};
 use std::ffi::{OsStr, OsString};
-use std::fs::{DirEntry, File, Metadata};
+use std::fs::{DirEntry, File, Metadata, TryLockError};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
@@ -217,23 +217,29 @@ pub(crate) fn remove_half_written(folder: &Path, names: &[&str]) -> io::Result<(
     Ok(())
 }
 
-/// Makes a rename in a folder durable. (Only Unix can sync a folder.)
 /// Runs `work` while no other process runs such work in the folder of a file, so that of two which
-/// read a file, add to it and write it, neither loses what the other adds. Some file systems cannot
-/// lock a folder; there it just runs.
+/// read a file, add to it and write it, neither loses what the other adds. Where a folder cannot be
+/// locked (Windows, NFS), and if others hold it for seconds, `work` runs all the same.
 pub(crate) fn alone_beside<T>(file: &Path, work: impl FnOnce() -> T) -> T {
+    const TRY: Duration = Duration::from_millis(5);
+    const TRIES: u32 = 600;
     let folder = file
         .parent()
         .filter(|folder| !folder.as_os_str().is_empty())
         .unwrap_or(Path::new("."));
-    let lock = File::open(folder)
-        .ok()
-        .filter(|folder| folder.lock().is_ok());
+    let folder = File::open(folder).ok();
+    for _ in 0..TRIES {
+        match folder.as_ref().map(File::try_lock) {
+            Some(Err(TryLockError::WouldBlock)) => std::thread::sleep(TRY),
+            _ => break,
+        }
+    }
     let done = work();
-    drop(lock);
+    drop(folder);
     done
 }
 
+/// Makes a rename in a folder durable. (Only Unix can sync a folder.)
 pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
     if cfg!(unix) {
         File::open(folder)?.sync_all()

@@ -161,6 +161,7 @@ impl Shape {
                 }
             }
         }
+        drop(known);
         let mut order: Vec<usize> = (0..counts.len()).collect();
         order.sort_by_key(|&patch| counts[patch] == 1);
         let mut numbers = vec![0; order.len()];

@@ -88,7 +88,7 @@ Exit codes:
   2    wrong command line
   3    file missing or wrong, or a value out of range
   4    rollout unstable (simulate)
-  5    run folder, dataset folder or port taken
+  5    folder of a run, dataset or site, or port taken
   75   stopped by a signal, saved, can be resumed
   130  ended at once by Ctrl-C: the second, or the first with nothing to save";
 

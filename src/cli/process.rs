@@ -87,6 +87,27 @@ fn failed_among(ranks: Ranks, error: &Error) -> ! {
     ranks.abort(error.kind.exit_code())
 }
 
+/// Returns an error of the command line in one line, with clap's tips as advice.
+fn as_error(help: &clap::Error) -> Error {
+    if help.kind() == clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        return Error::usage("expected a command or an argument".to_string());
+    }
+    let text = help.to_string();
+    let one_line = |lines: &str| lines.split_whitespace().collect::<Vec<_>>().join(" ");
+    let mut parts = text
+        .trim_start_matches("error: ")
+        .split("\n\n")
+        .map(one_line);
+    let error = Error::usage(parts.next().unwrap_or_default());
+    let tips: Vec<String> = parts
+        .filter_map(|part| Some(part.strip_prefix("tip: ")?.to_string()))
+        .collect();
+    match tips.is_empty() {
+        true => error,
+        false => error.advice(tips.join("; ")),
+    }
+}
+
 /// Prints help, the version, or an error of the command line, and returns the exit code.
 fn say(help: &clap::Error, arguments: &[OsString]) -> u8 {
     let code = u8::try_from(help.exit_code()).unwrap_or(2);
@@ -95,10 +116,7 @@ fn say(help: &clap::Error, arguments: &[OsString]) -> u8 {
         .iter()
         .any(|argument| argument.to_string_lossy().contains(is_unseen));
     if help.use_stderr() && arguments.iter().any(|argument| argument == "--json") {
-        let text = help.to_string();
-        let message = text.split("\n\nUsage:").next().unwrap_or(&text);
-        let message = message.trim_start_matches("error: ").trim().to_string();
-        Console::new(Mode::Json).failed(&Error::usage(message));
+        Console::new(Mode::Json).failed(&as_error(help));
         return code;
     }
     if help.use_stderr() && hides_any {

@@ -160,6 +160,15 @@ pub fn audit(options: &AuditOptions, session: &Session) -> Result<AuditOutcome, 
     let done = AtomicU64::new(0);
     let mut unwritten = Unwritten::default();
     let ranks = session.ranks;
+    let write = |file: &mut AuditFile| {
+        alone_beside(&options.out, || {
+            // Another audit of this run may have written meanwhile.
+            file.add_known(&options.out);
+            file.robots
+                .sort_by_key(|robot| order.iter().position(|id| *id == robot.id));
+            file.write(&options.out)
+        })
+    };
     for batch in open.chunks(BATCH * ranks.size()) {
         let own = batch
             .par_iter()
@@ -188,17 +197,9 @@ pub fn audit(options: &AuditOptions, session: &Session) -> Result<AuditOutcome, 
             file.robots.retain(|before| before.id != found.id);
             file.robots.push(found);
         }
-        let written = alone_beside(&options.out, || {
-            // Another audit of this run may have written meanwhile.
-            file.add_known(&options.out);
-            file.robots
-                .sort_by_key(|robot| order.iter().position(|id| *id == robot.id));
-            match ranks.leads() && !file.robots.is_empty() {
-                true => file.write(&options.out),
-                false => Ok(()),
-            }
-        });
-        unwritten.tried(written, session)?;
+        if ranks.leads() && !file.robots.is_empty() {
+            unwritten.tried(write(&mut file), session)?;
+        }
         if stopped {
             return Ok(AuditOutcome {
                 called,
@@ -212,13 +213,7 @@ pub fn audit(options: &AuditOptions, session: &Session) -> Result<AuditOutcome, 
         }
     }
     if ranks.leads() {
-        let written = alone_beside(&options.out, || {
-            file.add_known(&options.out);
-            file.robots
-                .sort_by_key(|robot| order.iter().position(|id| *id == robot.id));
-            file.write(&options.out)
-        });
-        unwritten.tried(written, session)?;
+        unwritten.tried(write(&mut file), session)?;
     }
     Ok(AuditOutcome {
         called,

@@ -262,7 +262,7 @@ pub(crate) fn measure(of: &Gaits, session: &Session) -> Result<(), Error> {
         };
         let (found, none) = response::measure_any(&options, session)?;
         if let Some(error) = none {
-            // An earlier call measured the others.
+            // Others may be measured already, or be of other runs.
             session.observer.warning(&format!("{error}; left out"));
         }
         if found.stopped {

@@ -52,12 +52,10 @@ pub(crate) struct Experiment {
 const LEAST: [usize; 2] = [100, 5];
 
 impl PaperPlan {
-    /// Returns true if a name means the built-in plan, and no file. An empty file is none: the shell
-    /// has made it for `morphcog config NAME > NAME`.
+    /// Returns true if a name means the built-in plan, and no file.
     pub(crate) fn is_built_in(name: &str) -> bool {
         let own = PAPER_TOML.0;
-        (name == own || own.strip_suffix(".toml") == Some(name))
-            && std::fs::metadata(name).map_or(true, |found| found.is_file() && found.len() == 0)
+        (name == own || own.strip_suffix(".toml") == Some(name)) && !Path::new(name).exists()
     }
 
     /// Returns the plan as TOML, with the value of every key.
@@ -71,11 +69,15 @@ impl PaperPlan {
         let text = match read_given(Path::new(name)) {
             Err(_) if PaperPlan::is_built_in(name) => PAPER_TOML.1.to_string(),
             Err(error) => return Err(Error::reading(Path::new(name), &error)),
-            Ok(_) if PaperPlan::is_built_in(name) => PAPER_TOML.1.to_string(),
             Ok(text) => text,
         };
+        PaperPlan::parse(&text, name, overrides)
+    }
+
+    /// Reads a plan from text; `name` is the path that its text has, or would have.
+    pub(crate) fn parse(text: &str, name: &str, overrides: &[String]) -> Result<Self, Error> {
         let format = reading::Format::of(Path::new(name));
-        let plan: PaperPlan = reading::read(&text, format, name)?;
+        let plan: PaperPlan = reading::read(text, format, name)?;
         let folder = Path::new(name).parent().unwrap_or(Path::new(""));
         let placed = |plan: &PaperPlan| PaperPlan {
             folder: folder.to_path_buf(),
@@ -86,7 +88,7 @@ impl PaperPlan {
                 .and_then(|()| placed(plan).experiments().map(|_| ()))
         };
         let plan = reading::changed(plan, overrides, check, |error| {
-            reading::placed(error, &text, format, name)
+            reading::placed(error, text, format, name)
         })?;
         Ok(placed(&plan))
     }

@@ -337,15 +337,8 @@ impl Config {
             _ => false,
         };
         let text = match read_given(&path) {
-            // `morphcog config NAME > NAME` finds the empty file that the shell has made.
-            Ok(text) if text.is_empty() && built_in().is_some() => String::new(),
             Ok(text) => return Config::parse(&text, &path.to_string_lossy(), overrides),
-            Err(error) if is_no_file(&error) => String::new(),
-            Err(error) => return Err(Error::reading(&path, &error)),
-        };
-        let text = match text.is_empty() {
-            false => text,
-            true => match built_in() {
+            Err(error) if is_no_file(&error) => match built_in() {
                 Some((_, text)) => (*text).to_string(),
                 None => {
                     let names = BUILT_IN.map(|(name, _)| name).join(", ");
@@ -356,6 +349,7 @@ impl Config {
                     .advice(format!("the built-in configs are {names}")));
                 }
             },
+            Err(error) => return Err(Error::reading(&path, &error)),
         };
         Config::parse(&text, name, overrides)
     }

@@ -41,11 +41,12 @@ pub(crate) fn write(folder: &Path) -> Result<Vec<PathBuf>, Error> {
         PAGE if documented => (PAGE, with_documentation(text).into_bytes()),
         name => (name, text.as_bytes().to_vec()),
     };
-    let mut files: Vec<(&str, Vec<u8>)> = ASSETS.iter().map(text).collect();
+    // First what shows that the others are a site's, should it be stopped.
+    let mut files = vec![(PINNED, pinned()?.to_string().into_bytes())];
+    files.extend(ASSETS.iter().map(text));
     files.push(("worker.js", include_bytes!("page/worker.js").to_vec()));
     files.push(("simulator.gz", SIMULATOR.to_vec()));
     files.push(("gallery.gz", compressed(gallery::exported().as_bytes())));
-    files.push((PINNED, pinned()?.to_string().into_bytes()));
     // No other page has this file.
     let is_site = folder.join(PINNED).exists();
     let mut paths = files.iter().map(|(name, _)| folder.join(name));

@@ -96,7 +96,7 @@ impl RunFolder {
             .map_err(|error| Error::writing(path, &error))?;
         if if_exists == IfExists::Overwrite {
             // An unchanged config stays, with its author's comments. Checkpoints, which are last,
-            // go first: without the rest, they would revive a run.
+            // go first: left behind alone, they would revive the run.
             let files = RunFolder::files().into_iter().rev();
             for name in files.filter(|name| *name != CONFIG) {
                 let file = path.join(name);

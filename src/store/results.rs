@@ -109,7 +109,7 @@ pub(crate) fn make_room(
         name.push(path.extension().unwrap_or_default());
         path.with_file_name(name)
     };
-    // The table first: without its results, a kill in between leaves both to the next attempt.
+    // The table first: after a kill in between, the results are still there for the next attempt.
     for path in [&path.with_extension("csv"), path] {
         match ownership::check(path).and_then(|()| std::fs::rename(path, aside(path))) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => {

@@ -86,6 +86,13 @@ fn an_empty_file_of_the_name_of_a_built_in_config_does_not_hide_it() {
         sandbox.write(name, "");
         let again = sandbox.run(&format!("config {name}")).ended(0, &[]).out;
         assert!(!printed.is_empty() && again == printed, "{name}: {again}");
+        // Nothing runs with it.
+        let command = if name == "paper.toml" {
+            "reproduce"
+        } else {
+            "evolve -c"
+        };
+        sandbox.run(&format!("{command} {name}")).ended(3, &[name]);
     }
 }
 

@@ -261,8 +261,8 @@ pub(crate) fn stage(
         let refused = match found.refused.as_slice() {
             [] => String::new(),
             [first, ..] => format!(
-                "; {} cannot be read: {} {}",
-                counted(found.refused.len(), "other", "others"),
+                "; {} left out, such as {} {}",
+                counted(found.refused.len(), "other is", "others are"),
                 first.source,
                 first.reason
             ),
@@ -1160,7 +1160,7 @@ mod tests {
         place.put("bad.csv", b"1,0,9,300,0\n2,0,0,0,0\n");
         place.refused(
             &["bad.csv"],
-            "1 other cannot be read: bad.csv:1 has \"300\"",
+            "1 other is left out, such as bad.csv:1 has \"300\"",
         );
         place.put("empty/readme", b"x");
         place.refused(&["empty"], "expected a folder with one subfolder");

@@ -208,7 +208,7 @@ fn is_header(record: &csv::ByteRecord, label: usize) -> bool {
 }
 
 /// Returns true for a row that numbers the columns, but for the one called the label, as pandas does
-/// with columns without names. No image has such pixels and such a label.
+/// with columns without names. Hardly an image has such pixels and such a label.
 fn counts_up(record: &csv::ByteRecord, named: Option<usize>) -> bool {
     let columns = record
         .iter()
@@ -219,7 +219,9 @@ fn counts_up(record: &csv::ByteRecord, named: Option<usize>) -> bool {
         .collect();
     numbers.is_some_and(|numbers| {
         (named.is_some() || numbers[0] == 0)
-            && numbers.windows(2).all(|pair| pair[0] + 1 == pair[1])
+            && numbers
+                .windows(2)
+                .all(|pair| pair[1].checked_sub(pair[0]) == Some(1))
     })
 }
 
