@@ -86,7 +86,7 @@ fn draw_sheet(staged: &import::Staged, name: &str) -> Result<(), Error> {
     let sheet =
         sheet::contact_sheet(&dataset, Split::Train, SAMPLES).and_then(|sheet| sheet::png(&sheet));
     match sheet {
-        Ok(png) => staged.write(import::SHEET_PNG, &png),
+        Ok(png) => staged.write(import::store::SHEET_PNG, &png),
         // Of many classes of large images there is none.
         Err(sheet::SheetError::Size { .. }) => Ok(()),
         Err(error) => Err(Error::other(error.to_string())),

@@ -13,7 +13,7 @@ mod pictures;
 mod prepare;
 mod source;
 mod split;
-mod store;
+pub(crate) mod store;
 mod tables;
 
 use crate::base::Grid;
@@ -32,7 +32,7 @@ use crate::data::import::arrays::{LabelledArrays, Pair};
 use crate::data::import::classes::Classes;
 use crate::data::import::item::{Found, Grey, Item, Label, Part, Picture};
 use crate::data::import::prepare::{Facts, Plan};
-use crate::data::import::store::Staging;
+use crate::data::import::store::{IMAGES_CSV, Staging};
 use crate::data::info::Split;
 pub use item::Refused;
 pub use prepare::{Fit, Fitted};
@@ -41,12 +41,6 @@ use serde::Serialize;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-
-/// The table of the images' sources, in a dataset's folder.
-pub(crate) const IMAGES_CSV: &str = "images.csv";
-
-/// The name of the picture with some images of each class.
-pub(crate) const SHEET_PNG: &str = "sheet.png";
 
 /// Most pixels of a picture that is kept between the two readings.
 const FEW_PIXELS: usize = 1 << 14;

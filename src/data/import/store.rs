@@ -4,8 +4,13 @@ use crate::base::error::Error;
 use crate::base::files::{sync_folder, write_atomically};
 use crate::base::remedy::Remedy;
 use crate::data::description::DATASET_JSON;
-use crate::data::import::{IMAGES_CSV, SHEET_PNG};
 use std::path::{Path, PathBuf};
+
+/// The table of the images' sources, in a dataset's folder.
+pub(crate) const IMAGES_CSV: &str = "images.csv";
+
+/// The name of the picture with some images of each class.
+pub(crate) const SHEET_PNG: &str = "sheet.png";
 
 /// A folder beside the one that is wanted, removed on drop unless it has taken its place.
 #[derive(Debug)]
