@@ -6,7 +6,6 @@ use crate::base::Grid;
 use crate::base::random::Stream;
 use crate::baseline::settings::{Activation, NetworkKind, Pooling};
 use nalgebra::{DVector, DVectorView};
-use std::collections::HashMap;
 use std::ops::Range;
 
 impl Activation {
@@ -123,94 +122,53 @@ impl Shape {
         })
     }
 
-    /// Prepares images: which pixels are lit under the hidden units at each place.
+    /// Prepares an image: the lit pixels under the hidden units at each place. Most pixels of a
+    /// drawing are dark and add nothing to a sum, so leaving them out saves most of the work.
     ///
     /// # Panics
-    /// If an image does not have the shape's size.
-    pub(crate) fn patches(&self, images: &[&Grid<f64>]) -> Patches {
+    /// If the image does not have the shape's size.
+    pub(crate) fn patches(&self, image: &Grid<f64>) -> Patches {
+        assert_eq!(
+            (image.height(), image.width()),
+            self.image,
+            "an image of the shape's size"
+        );
         let [window, pooled] = self.pooled();
         let grid = |(rows, columns): (usize, usize)| {
             (0..rows).flat_map(move |row| (0..columns).map(move |column| (row, column)))
         };
-        let mut counts: Vec<usize> = Vec::new();
-        let mut lit_pixels: Vec<Vec<(usize, f64)>> = Vec::new();
-        let mut known: HashMap<Vec<(usize, u64)>, usize> = HashMap::new();
-        let mut places = Vec::new();
-        for image in images {
-            assert_eq!(
-                (image.height(), image.width()),
-                self.image,
-                "an image of the shape's size"
-            );
-            for place in grid(pooled) {
-                for within in grid(window) {
-                    let corner = (place.0 * window.0 + within.0, place.1 * window.1 + within.1);
-                    let lit: Vec<(usize, f64)> = grid(self.field())
-                        .map(|(row, column)| image[(corner.0 + row, corner.1 + column)])
-                        .enumerate()
-                        .filter(|(_, value)| *value != 0.0)
-                        .collect();
-                    let bits = lit.iter().map(|(pixel, value)| (*pixel, value.to_bits()));
-                    let patch = *known.entry(bits.collect()).or_insert_with(|| {
-                        counts.push(0);
-                        lit_pixels.push(lit);
-                        counts.len() - 1
-                    });
-                    counts[patch] += 1;
-                    places.push(patch);
-                }
-            }
-        }
-        drop(known);
-        let mut order: Vec<usize> = (0..counts.len()).collect();
-        order.sort_by_key(|&patch| counts[patch] == 1);
-        let mut numbers = vec![0; order.len()];
         let mut patches = Patches {
             ends: Vec::new(),
             lit: Vec::new(),
-            repeated: counts.iter().filter(|&&count| count > 1).count(),
-            places,
-            per_image: self.places().0 * self.places().1,
         };
-        for (number, patch) in order.into_iter().enumerate() {
-            numbers[patch] = number;
-            patches.lit.append(&mut lit_pixels[patch]);
-            patches.ends.push(patches.lit.len());
-        }
-        for patch in &mut patches.places {
-            *patch = numbers[*patch];
+        for place in grid(pooled) {
+            for within in grid(window) {
+                let corner = (place.0 * window.0 + within.0, place.1 * window.1 + within.1);
+                let pixels = grid(self.field())
+                    .map(|(row, column)| image[(corner.0 + row, corner.1 + column)]);
+                patches
+                    .lit
+                    .extend(pixels.enumerate().filter(|(_, value)| *value != 0.0));
+                patches.ends.push(patches.lit.len());
+            }
         }
         patches
     }
 }
 
-/// Images as the inputs of a network's hidden units. A patch is what these cover at a place. Most
-/// pixels of a drawing are dark and add nothing to a sum, and most patches occur many times, so
-/// leaving out dark pixels and computing repeated patches once saves most of the work.
+/// An image as the inputs of a network's hidden units.
 #[derive(Clone, Debug)]
 pub(crate) struct Patches {
-    /// End of each patch's pixels in `lit`.
+    /// End of each place's pixels in `lit`; places that pooling reduces to one are neighbours.
     ends: Vec<usize>,
-    /// Index of the pixel within its patch, and its value.
+    /// Index of the pixel within its place, and its value.
     lit: Vec<(usize, f64)>,
-    /// Number of patches that occur more than once; they come first.
-    repeated: usize,
-    /// Patches by image, then by place; places that pooling reduces to one are neighbours.
-    places: Vec<usize>,
-    /// Number of places of an image.
-    per_image: usize,
 }
 
 impl Patches {
-    /// Returns the patches of an image, by place.
-    fn of(&self, image: usize) -> &[usize] {
-        &self.places[image * self.per_image..][..self.per_image]
-    }
-
-    /// Returns a patch's lit pixels.
-    fn lit(&self, patch: usize) -> &[(usize, f64)] {
-        let begin = if patch == 0 { 0 } else { self.ends[patch - 1] };
-        &self.lit[begin..self.ends[patch]]
+    fn at(&self, place: usize) -> &[(usize, f64)] {
+        let begin = if place == 0 { 0 } else { self.ends[place - 1] };
+        &self.lit[begin..self.ends[place]]
     }
 }
 
@@ -220,8 +178,8 @@ pub(crate) struct Network {
     parameters: DVector<f64>,
     /// Activations of the hidden units, by place, then by unit.
     units: Vec<f64>,
-    /// Activations after pooling, by place, then by unit; empty if each place is one feature.
-    pooled: Vec<f64>,
+    /// Outputs of the hidden layer after pooling, by place, then by unit.
+    features: DVector<f64>,
 }
 
 impl Network {
@@ -246,11 +204,12 @@ impl Network {
             parameters[parameter] = draw(features);
         }
         let (within, places) = shape.places();
+        let units = vec![0.0; within * places * size];
         Network {
             shape,
             parameters,
-            units: vec![0.0; within * places * size],
-            pooled: vec![0.0; if within == 1 { 0 } else { features }],
+            units,
+            features: DVector::zeros(features),
         }
     }
 
@@ -269,61 +228,27 @@ impl Network {
             .rows(weights.start + output * features, features)
     }
 
-    /// Returns the outputs of the hidden layer for the last image.
-    fn features(&self) -> DVectorView<'_, f64> {
-        let features = if self.pooled.is_empty() {
-            &self.units
-        } else {
-            &self.pooled
-        };
-        DVectorView::from_slice(features, features.len())
-    }
-
-    /// Computes the activations of the hidden units for a patch.
-    fn activate(&self, lit: &[(usize, f64)], units: &mut [f64]) {
-        let [hidden, biases, ..] = self.shape.layout();
-        let parameters = self.parameters.as_slice();
-        weighted_sums(units, &parameters[biases], lit, &parameters[hidden]);
-        self.shape.activation.apply(units);
-    }
-
-    /// Computes the activations for all patches that occur more than once, for [`Self::forward`]
-    /// with the present parameters.
-    pub(crate) fn repeated(&self, images: &Patches) -> Vec<f64> {
-        let size = self.shape.size;
-        let mut repeated = vec![0.0; images.repeated * size];
-        for (patch, units) in repeated.chunks_exact_mut(size).enumerate() {
-            self.activate(images.lit(patch), units);
+    /// Computes the outputs for an image, before the softmax.
+    pub(crate) fn forward(&mut self, image: &Patches) -> [f64; OUTPUTS] {
+        let Shape {
+            size, activation, ..
+        } = self.shape;
+        let [hidden, biases, _, output_biases] = self.shape.layout();
+        let hidden = &self.parameters.as_slice()[hidden];
+        let biases = &self.parameters.as_slice()[biases];
+        for place in 0..self.units.len() / size {
+            let units = &mut self.units[place * size..][..size];
+            weighted_sums(units, biases, image.at(place), hidden);
         }
-        repeated
-    }
-
-    /// Computes the outputs for an image, before the softmax. `repeated` is empty or has the
-    /// activations for repeated patches.
-    pub(crate) fn forward(
-        &mut self,
-        images: &Patches,
-        image: usize,
-        repeated: &[f64],
-    ) -> [f64; OUTPUTS] {
-        let Shape { size, pooling, .. } = self.shape;
-        // Taken out, since `activate` borrows the whole network.
-        let mut units = std::mem::take(&mut self.units);
-        for (units, &patch) in units.chunks_exact_mut(size).zip(images.of(image)) {
-            match repeated.get(patch * size..(patch + 1) * size) {
-                Some(known) => units.copy_from_slice(known),
-                None => self.activate(images.lit(patch), units),
-            }
-        }
-        self.units = units;
+        activation.apply(&mut self.units);
         let (within, _) = self.shape.places();
-        let features = self.pooled.chunks_exact_mut(size);
-        for (features, units) in features.zip(self.units.chunks_exact(size * within)) {
-            pool(features, units, pooling);
+        let features = self.features.as_mut_slice();
+        for first in (0..features.len()).step_by(size) {
+            let units = &self.units[first * within..][..size * within];
+            pool(&mut features[first..][..size], units, self.shape.pooling);
         }
-        let [.., output_biases] = self.shape.layout();
         let output = |output: usize| {
-            self.output_weights(output).dot(&self.features())
+            self.output_weights(output).dot(&self.features)
                 + self.parameters[output_biases.start + output]
         };
         std::array::from_fn(output)
@@ -332,8 +257,7 @@ impl Network {
     /// Adds to `gradient` a loss's derivatives, given those by the outputs, for the last `forward`.
     pub(crate) fn backward(
         &self,
-        images: &Patches,
-        image: usize,
+        image: &Patches,
         outputs: [f64; OUTPUTS],
         gradient: &mut DVector<f64>,
     ) {
@@ -345,19 +269,17 @@ impl Network {
         } = self.shape;
         let [hidden, biases, weights, output_biases] = self.shape.layout();
         let features = self.shape.features();
-        let pooled = self.features();
         let mut by_features = DVector::zeros(features);
         for (output, derivative) in outputs.into_iter().enumerate() {
             gradient
                 .rows_mut(weights.start + output * features, features)
-                .axpy(derivative, &pooled, 1.0);
+                .axpy(derivative, &self.features, 1.0);
             gradient[output_biases.start + output] += derivative;
             by_features.axpy(derivative, &self.output_weights(output), 1.0);
         }
         let (within, _) = self.shape.places();
         let mut by_units = vec![0.0; size];
-        let places = self.units.chunks_exact(size).zip(images.of(image));
-        for (place, (units, &patch)) in places.enumerate() {
+        for (place, units) in self.units.chunks_exact(size).enumerate() {
             let feature = place / within * size;
             for (number, derivative) in by_units.iter_mut().enumerate() {
                 let share = match pooling {
@@ -368,7 +290,7 @@ impl Network {
                         let of_place = (place / within * within..place)
                             .all(|other| self.units[other * size + number] < units[number]);
                         f64::from(u8::from(
-                            of_place && units[number] == pooled[feature + number],
+                            of_place && units[number] == self.features[feature + number],
                         ))
                     }
                 };
@@ -377,7 +299,7 @@ impl Network {
             }
             let gradient = gradient.as_mut_slice();
             add_scaled(&mut gradient[biases.clone()], 1.0, &by_units);
-            for &(pixel, value) in images.lit(patch) {
+            for &(pixel, value) in image.at(place) {
                 add_scaled(
                     &mut gradient[hidden.start + pixel * size..][..size],
                     value,
@@ -487,7 +409,6 @@ mod tests {
     use crate::base::random::{Purpose, stream};
 
     const IMAGE: (usize, usize) = (7, 6);
-    const COUNT: usize = 3;
 
     /// Makes noise in which every third pixel is dark.
     fn images() -> Vec<Grid<f64>> {
@@ -499,7 +420,7 @@ mod tests {
                 rng.uniform(0.0, 1.0)
             }
         };
-        (0..COUNT)
+        (0..3)
             .map(|_| Grid::from_fn(IMAGE.0, IMAGE.1, |row, column| pixel(row, column, rng)))
             .collect()
     }
@@ -574,17 +495,15 @@ mod tests {
             };
             let features = windows.len() * shape.size;
             let [_, _, weights, biases] = shape.layout();
-            let images = images();
-            let patches = shape.patches(&images.iter().collect::<Vec<_>>());
-            for (number, image) in images.iter().enumerate() {
-                let found = network.forward(&patches, number, &[]);
+            for image in images() {
+                let found = network.forward(&shape.patches(&image));
                 for (output, found) in found.into_iter().enumerate() {
                     let mut expected = network.parameters[biases.start + output];
                     for (number, window) in windows.iter().enumerate() {
                         for k in 0..shape.size {
                             let all: Vec<f64> = window
                                 .iter()
-                                .map(|corner| unit(&network, k, image, *corner))
+                                .map(|corner| unit(&network, k, &image, *corner))
                                 .collect();
                             let pooled = if shape.pooling == Pooling::Mean {
                                 mean(&all)
@@ -610,17 +529,16 @@ mod tests {
         const STEP: f64 = 1e-5;
         for shape in shapes() {
             let mut network = network(shape);
-            let images = shape.patches(&images().iter().collect::<Vec<_>>());
+            let images: Vec<Patches> = images().iter().map(|image| shape.patches(image)).collect();
             let loss = |network: &mut Network| -> f64 {
                 let of_image =
-                    |image| cross_entropy(network.forward(&images, image, &[]), image % 2).0;
-                (0..COUNT).map(of_image).sum()
+                    |(number, image)| cross_entropy(network.forward(image), number % 2).0;
+                images.iter().enumerate().map(of_image).sum()
             };
             let mut gradient = DVector::zeros(network.parameters.len());
-            for image in 0..COUNT {
-                let (_, by_outputs) =
-                    cross_entropy(network.forward(&images, image, &[]), image % 2);
-                network.backward(&images, image, by_outputs, &mut gradient);
+            for (number, image) in images.iter().enumerate() {
+                let (_, by_outputs) = cross_entropy(network.forward(image), number % 2);
+                network.backward(image, by_outputs, &mut gradient);
             }
             for parameter in 0..network.parameters.len() {
                 let kept = network.parameters[parameter];
@@ -633,32 +551,6 @@ mod tests {
                 assert!(
                     (found - expected).abs() < 1e-8,
                     "{shape:?}, {parameter}: {found} {expected}"
-                );
-            }
-        }
-    }
-    #[test]
-    fn repeated_patches_change_no_bit_of_the_outputs() {
-        // Stripes repeat patches within an image, two equal images all of them.
-        let stripes = |period: usize| {
-            Grid::from_fn(IMAGE.0, IMAGE.1, |row, column| {
-                f64::from(u8::from((row + column).is_multiple_of(period))) * 0.7
-            })
-        };
-        let mut all = images();
-        all.extend([stripes(2), stripes(3), stripes(3)]);
-        for shape in shapes() {
-            let mut network = network(shape);
-            let together = shape.patches(&all.iter().collect::<Vec<_>>());
-            let repeated = network.repeated(&together);
-            assert!(!repeated.is_empty() && together.repeated < together.ends.len());
-            for (number, image) in all.iter().enumerate() {
-                let found = network.forward(&together, number, &repeated);
-                let alone = network.forward(&shape.patches(&[image]), 0, &[]);
-                assert_eq!(
-                    found.map(f64::to_bits),
-                    alone.map(f64::to_bits),
-                    "{shape:?}"
                 );
             }
         }

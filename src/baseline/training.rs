@@ -11,9 +11,7 @@ use nalgebra::DVector;
 /// Images with their groups (0 or 1), prepared for networks of a kind.
 #[derive(Clone, Debug)]
 pub(crate) struct Samples {
-    images: Patches,
-    /// Group of each image.
-    groups: Vec<usize>,
+    images: Vec<(Patches, usize)>,
     /// The networks' shape, except for their size.
     shape: Shape,
 }
@@ -55,12 +53,11 @@ impl Samples {
             activation,
             pooling,
         };
-        let (images, groups): (Vec<&Grid<f64>>, Vec<usize>) = images.iter().copied().unzip();
-        Ok(Samples {
-            images: shape.patches(&images),
-            groups,
-            shape,
-        })
+        let images = images
+            .iter()
+            .map(|(image, group)| (shape.patches(image), *group))
+            .collect();
+        Ok(Samples { images, shape })
     }
 }
 
@@ -72,14 +69,13 @@ fn test(
     session: &Session,
 ) -> Result<(f64, f64), Stopped> {
     let (mut correct, mut loss) = (0, 0.0);
-    let repeated = network.repeated(&samples.images);
-    for (image, group) in samples.groups.iter().enumerate() {
+    for (image, group) in &samples.images {
         session.check()?;
-        let outputs = network.forward(&samples.images, image, &repeated);
+        let outputs = network.forward(image);
         correct += usize::from(usize::from(outputs[1] > outputs[0]) == *group);
         loss += cross_entropy(outputs, *group).0;
     }
-    let accuracy = correct as f64 / samples.groups.len() as f64;
+    let accuracy = correct as f64 / samples.images.len() as f64;
     Ok((
         accuracy,
         if watch == Watch::Accuracy {
@@ -153,7 +149,7 @@ pub(crate) fn train(
     let parameters = network.parameters().len();
     let mut adam = Adam::new(hyper.learning_rate, parameters);
     let mut gradient = DVector::zeros(parameters);
-    let count = training.groups.len();
+    let count = training.images.len();
     let batch = if hyper.batch == 0 { count } else { hyper.batch };
     let mut best: Option<(f64, Option<DVector<f64>>)> = None;
     let mut waited = 0;
@@ -163,12 +159,11 @@ pub(crate) fn train(
     while done < epochs && waited < patience {
         for chosen in rng.sample(count, count).chunks(batch) {
             gradient.fill(0.0);
-            for &image in chosen {
+            for (image, group) in chosen.iter().map(|index| &training.images[*index]) {
                 session.check()?;
-                let outputs = network.forward(&training.images, image, &[]);
-                let (_, by_outputs) = cross_entropy(outputs, training.groups[image]);
+                let (_, by_outputs) = cross_entropy(network.forward(image), *group);
                 let by_outputs = by_outputs.map(|derivative| derivative / chosen.len() as f64);
-                network.backward(&training.images, image, by_outputs, &mut gradient);
+                network.backward(image, by_outputs, &mut gradient);
             }
             adam.step(network.parameters_mut(), &gradient);
         }
@@ -306,11 +301,10 @@ mod tests {
                     rng,
                 );
                 let mut adam = Adam::new(hyper.learning_rate, network.parameters().len());
-                for (image, group) in images.groups.iter().enumerate() {
+                for (image, group) in &images.images {
                     let mut gradient = DVector::zeros(network.parameters().len());
-                    let outputs = network.forward(&images.images, image, &[]);
-                    let (_, by_outputs) = cross_entropy(outputs, *group);
-                    network.backward(&images.images, image, by_outputs, &mut gradient);
+                    let (_, by_outputs) = cross_entropy(network.forward(image), *group);
+                    network.backward(image, by_outputs, &mut gradient);
                     adam.step(network.parameters_mut(), &gradient);
                 }
                 bits.extend(
