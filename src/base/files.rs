@@ -223,11 +223,7 @@ pub(crate) fn remove_half_written(folder: &Path, names: &[&str]) -> io::Result<(
 pub(crate) fn alone_beside<T>(file: &Path, work: impl FnOnce() -> T) -> T {
     const TRY: Duration = Duration::from_millis(5);
     const TRIES: u32 = 600;
-    let folder = file
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
-    let folder = File::open(folder).ok();
+    let folder = File::open(folder_of(file)).ok();
     for _ in 0..TRIES {
         match folder.as_ref().map(File::try_lock) {
             Some(Err(TryLockError::WouldBlock)) => std::thread::sleep(TRY),

@@ -11,6 +11,7 @@ pub mod random;
 pub(crate) mod ranges;
 pub mod ranks;
 pub mod remedy;
+pub(crate) mod running;
 pub mod session;
 pub(crate) mod shell;
 #[cfg(not(target_family = "wasm"))]

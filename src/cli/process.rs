@@ -98,7 +98,7 @@ fn as_error(help: &clap::Error) -> Error {
         .trim_start_matches("error: ")
         .split("\n\n")
         .map(one_line);
-    let error = Error::usage(parts.next().unwrap_or_default());
+    let error = Error::usage(parts.next().expect("a split text has a first part"));
     let tips: Vec<String> = parts
         .filter_map(|part| Some(part.strip_prefix("tip: ")?.to_string()))
         .collect();

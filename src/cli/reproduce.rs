@@ -32,7 +32,8 @@ pub(super) struct ReproduceArgs {
     /// Plan file (TOML or JSON), or paper.toml, which is built in.
     #[arg(default_value = PAPER_TOML.0)]
     plan: String,
-    /// More than 0, up to 1: multiplies generations; its square root multiplies test images (not below 100) and trainings (not below 5).
+    /// More than 0, up to 1: multiplies generations; its square root multiplies test images (not
+    /// below 100) and trainings (not below 5).
     #[arg(long, default_value_t = 1.0, value_parser = decimal())]
     scale: f64,
     #[arg(

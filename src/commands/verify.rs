@@ -5,6 +5,7 @@ use crate::base::error::Error;
 use crate::base::files::{read_text, write_atomically};
 use crate::base::number;
 use crate::base::observer::{Generation, Work};
+use crate::base::running::Running;
 use crate::base::session::Session;
 use crate::base::shell::quoted;
 use crate::base::text::duration;
@@ -535,19 +536,6 @@ fn run(
         std::thread::sleep(POLL);
     };
     Ok((status, events.all))
-}
-
-/// A command that ends with this value, so that an error here leaves none behind.
-struct Running(Child);
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        if !matches!(self.0.try_wait(), Ok(Some(_))) {
-            // Nothing helps against an error here.
-            let _ = self.0.kill();
-            let _ = self.0.wait();
-        }
-    }
 }
 
 fn stop(child: &mut Child) {

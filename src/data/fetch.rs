@@ -7,6 +7,7 @@ use crate::base::files::{read_bytes, write_atomically};
 use crate::base::hash::sha256_hex;
 use crate::base::observer::Work;
 use crate::base::remedy::Remedy;
+use crate::base::running::Running;
 use crate::base::session::Session;
 use crate::base::stop::Stopped;
 use crate::base::threads;
@@ -15,7 +16,7 @@ use crate::data::files::default_folder;
 use crate::data::idx;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
@@ -431,17 +432,6 @@ fn from_any(
         }
     }
     Ok(Err(attempts))
-}
-
-/// A process that is ended on drop.
-struct Running(Child);
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        // A process that has ended cannot be killed; nothing helps against either error.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
 }
 
 /// Returns the file that a program downloads. A stop ends it early with an error.

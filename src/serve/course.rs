@@ -86,7 +86,8 @@ mod tests {
         let line = |generation: u64| {
             format!("{generation},3,0.5,7,0.1,4,2,20,20,0,0,0,0,0,{generation}\n")
         };
-        let header = "generation,num_elites,coverage,qd_score,norm_qd_score,obj_max,obj_mean,evaluations,simulated,saved,\
+        let header = "generation,num_elites,coverage,qd_score,norm_qd_score,obj_max,obj_mean,evaluations,\
+                      simulated,saved,\
                       saved_known_bodies,saved_early_stop,saved_shared_rollouts,unstable,seconds\n";
         let lines: String = (9000..9010).map(line).collect();
         std::fs::write(folder.path().join(METRICS), format!("{header}{lines}")).unwrap();
