@@ -10,7 +10,7 @@ use morphcog::data::dataset::{Dataset, Split};
 use morphcog::data::files::places;
 use morphcog::images::whereabouts::stimulus_of;
 use morphcog::search::held_out_run::CYCLES;
-use morphcog::store::audit::AuditFile;
+use morphcog::store::audit::{AuditFile, Verdict};
 use morphcog::store::eval::EvalFile;
 use morphcog::store::images::ImageRef;
 use morphcog::store::run::RunFile;
@@ -200,6 +200,28 @@ fn the_robots_of_the_atlas_are_audited_and_walk_as_in_the_test_of_the_paper_s_ta
             .unwrap()
         };
         let audits: Vec<AuditFile> = (1..=5).map(audit).collect();
+        // data/README says so: all of zero or one, ten physical ones of each task of four digits.
+        for (run, audit) in runs.iter().zip(&audits) {
+            for task in run
+                .dimensions
+                .tasks
+                .iter()
+                .filter(|task| *task != "same way")
+            {
+                let of_task = run.elites.iter().filter(|elite| elite.task == *task);
+                let audited: Vec<_> = of_task
+                    .clone()
+                    .filter_map(|elite| audit.robot(&elite.id))
+                    .collect();
+                let physical = audited
+                    .iter()
+                    .filter(|robot| robot.verdict == Verdict::Physical);
+                match set {
+                    "zero_one" => assert_eq!(audited.len(), of_task.count()),
+                    _ => assert!(physical.count() >= 10, "{task}"),
+                }
+            }
+        }
         for (number, robot) in eval.robots.iter().enumerate() {
             assert!(audits[robot.run].robot(&robot.id).is_some(), "{}", robot.id);
             if let Some(mnist) = &mnist {
