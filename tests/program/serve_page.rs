@@ -716,7 +716,7 @@ fn a_team_walks_on_small_stages_and_its_votes_are_counted() {
 }
 
 #[test]
-fn cues_are_switched_while_the_body_walks_and_digits_come_back_with_their_robots() {
+fn cues_are_switched_within_a_walk_and_digits_come_back_with_their_robots() {
     with_both_engines(|browser, url, engine| {
         let mut tab = browser.tab(1280, 900, false);
         open(&mut tab, url);
@@ -729,9 +729,14 @@ fn cues_are_switched_while_the_body_walks_and_digits_come_back_with_their_robots
             ]
         };
         assert_eq!(cues(&mut tab), ["Cue a: dark", "Cue b: dark"]);
+        // Held in its middle, so that it does not end before both cues are switched.
+        let play = "document.getElementById('play')";
+        tab.wait(&format!(
+            "document.getElementById('time').value > 20 && ({play}.click(), true)"
+        ));
+        tab.wait(&format!("{play}.textContent === 'Play'"));
         let step = |tab: &mut Tab| tab.eval("Number(document.getElementById('time').value)");
-        tab.wait("Number(document.getElementById('time').value) > 20");
-        let before = step(&mut tab).as_f64().unwrap();
+        let before = step(&mut tab);
         for (button, now, picture) in [
             (
                 2,
@@ -750,8 +755,10 @@ fn cues_are_switched_while_the_body_walks_and_digits_come_back_with_their_robots
             ));
             assert_eq!(cues(&mut tab), now);
         }
-        // The same walk went on.
-        assert!(step(&mut tab).as_f64().unwrap() >= before);
+        // The same walk goes on.
+        assert_eq!(step(&mut tab), before);
+        tab.click("#play");
+        tab.wait(&format!("document.getElementById('time').value > {before}"));
         let invites = tab.text("#invites");
         assert!(invites.contains("of cues, not of drawings"), "{invites}");
         keep_picture(&format!("{engine}-gates.png"), &tab.screenshot());

@@ -890,6 +890,18 @@ fn a_done_task_whose_results_are_gone_is_done_again() {
                 .all(|name| now[*name] == before[*name])
         );
     }
+    // No result: without it, the task is done, with all its generations.
+    std::fs::remove_file(sandbox.path(&format!("{folder}/metrics.csv"))).unwrap();
+    let said = sandbox
+        .run("sweep plan.toml --out all --status --json")
+        .ended(0, &[]);
+    let status = &said.json_lines()[0];
+    let generations = &status["generations"];
+    assert_eq!(status["state"], "done");
+    assert!(
+        generations[0] == generations[1] && generations[0] != 0,
+        "{status}"
+    );
 }
 
 /// What a job script does that gets the signal before its time limit at once, with a `scontrol` that

@@ -92,6 +92,11 @@ fn status_of(
     let (generations, of_run) = match &task.run {
         Run::Evolve(config, ..) => {
             let (done, seconds) = last_generation(&folder.join(METRICS)).unwrap_or((0, 0.0));
+            // Whatever metrics.csv says: it may have been removed, or cut.
+            let done = match state {
+                TaskState::Done => config.generations,
+                _ => done,
+            };
             (
                 Some([done, config.generations]),
                 Some((done, seconds)).filter(|_| state != TaskState::Waiting),
