@@ -46,7 +46,7 @@ pub struct Claim {
     pub commands: Vec<String>,
     /// The kind of the last command's JSON event that has the values.
     #[serde(default, skip_serializing_if = "String::is_empty")]
-    pub(crate) event: String,
+    pub event: String,
     /// The values that are claimed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub values: Vec<Claimed>,
@@ -144,7 +144,7 @@ impl Agreement {
 
 impl Claimed {
     /// Measures the value in an event; `None` if it is not there.
-    fn measured(&self, event: &Value) -> Option<f64> {
+    pub fn measured(&self, event: &Value) -> Option<f64> {
         let mut found = vec![event];
         for key in self.at.split('/').skip(1) {
             found = found
@@ -152,7 +152,7 @@ impl Claimed {
                 .flat_map(|value| inside(value, key))
                 .collect();
         }
-        if let Some(counted) = &self.count {
+        if let Some(counted) = self.count.as_ref().filter(|_| !found.is_empty()) {
             return Some(found.iter().filter(|value| **value == counted).count() as f64);
         }
         let numbers: Option<Vec<f64>> = found.iter().map(|value| value.as_f64()).collect();
@@ -672,6 +672,7 @@ mod tests {
         assert_eq!(count("/robots/*/verdict", json!("physical")), Some(1.0));
         assert_eq!(count("/robots/*/right", json!(4)), Some(1.0));
         assert_eq!(count("/robots/*/right", json!(7)), Some(0.0));
+        assert_eq!(count("/robots/*/task", json!(7)), None);
     }
 
     #[test]

@@ -596,7 +596,12 @@ fn the_runs_of_a_reproduction_are_tasks_of_the_same_kind() {
     let status = reproduce("--out one --status").ended(0, &[]).out;
     assert!(status.contains("2 tasks: 1 done, 1 waiting"), "{status}");
     reproduce("--out one").ended(0, &[]);
-    reproduce("--out two").ended(0, &[]);
+    let events = reproduce("--out two --json").ended(0, &[]).json_lines();
+    let reproduced = events.iter().find(|event| event["event"] == "reproduced");
+    let claims = morphcog::commands::verify::claims().unwrap();
+    let claim = claims.iter().find(|claim| claim.event == "reproduced");
+    let first = claim.unwrap().values[0].measured(reproduced.unwrap());
+    assert!(first.is_some_and(|accuracy| accuracy <= 100.0));
     assert_eq!(
         sandbox.read("one/reproduction.csv"),
         sandbox.read("two/reproduction.csv")

@@ -1,9 +1,10 @@
 //! `morphcog verify`: its list of claims, and a claim that is measured again.
 
-use crate::common::program::{Sandbox, files};
+use crate::common::program::{Sandbox, files, mnist, said};
 use clap::Parser;
 use morphcog::cli::Cli;
-use morphcog::commands::verify::claims;
+use morphcog::commands::verify::{Claim, claims};
+use serde_json::Value;
 
 #[test]
 fn the_program_understands_every_command_of_a_claim() {
@@ -31,6 +32,67 @@ fn a_claim_is_measured_in_its_folder_once_and_is_reproduced() {
         before,
         "it is known"
     );
+}
+
+/// Asserts that an event has every value of a claim.
+#[track_caller]
+fn assert_measured(claim: &Claim, events: &[Value]) {
+    let event = events.iter().rfind(|event| event["event"] == *claim.event);
+    let event = event.unwrap_or_else(|| panic!("{}: no event {}", claim.name, claim.event));
+    for value in &claim.values {
+        let measured = value.measured(event);
+        assert!(measured.is_some(), "{}: {}", claim.name, value.label);
+    }
+}
+
+#[test]
+fn an_evaluation_tells_every_value_that_is_claimed_of_it() {
+    let Some(mnist) = mnist("where claims find the values of evaluations") else {
+        return;
+    };
+    let sandbox = Sandbox::new();
+    let mut found = 0;
+    for claim in claims().unwrap() {
+        let command = claim.commands.last().filter(|_| claim.event == "evaluated");
+        if let Some(few) = command.filter(|command| command.contains("--images 1000")) {
+            let few = few.replace("--images 1000", "--images 8");
+            let mut command = sandbox.command(few.split_whitespace());
+            command.args(["--json", "--data"]).arg(&mnist);
+            let events = said(command).ended(0, &[]).json_lines();
+            assert_measured(&claim, &events);
+            found += 1;
+        }
+    }
+    assert_eq!(found, 4);
+}
+
+#[test]
+fn the_team_that_ships_has_the_values_that_are_claimed_of_it() {
+    let Some(mnist) = mnist("the values that are claimed of the team") else {
+        return;
+    };
+    let sandbox = Sandbox::new();
+    let shipped = include_str!("../../data/team/team.json");
+    let mut shipped: Value = serde_json::from_str(shipped).unwrap();
+    // No other version may go on with it.
+    shipped["program_version"] = env!("CARGO_PKG_VERSION").into();
+    sandbox.write("verify/team/gallery-team.json", shipped.to_string());
+    let mut command = sandbox.command(["verify", "team", "--json", "--data"]);
+    command.arg(mnist);
+    let events = said(command).ended(0, &[]).json_lines();
+    let verified = events.iter().find(|event| event["event"] == "verified");
+    let agreements = verified.expect("the claim has a result")["agreements"].clone();
+    assert_eq!(agreements, serde_json::json!(["reproduced", "reproduced"]));
+    let events = sandbox.read("verify/team/events.jsonl");
+    let events: Vec<Value> = events
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    for claim in claims().unwrap() {
+        if claim.event == "team" {
+            assert_measured(&claim, &events);
+        }
+    }
 }
 
 #[test]
