@@ -326,7 +326,7 @@ pub(crate) struct Verified {
     pub(crate) measured: Vec<Option<f64>>,
     /// Comparison of each with the claimed value.
     pub(crate) agreements: Vec<Agreement>,
-    /// The error of a command that failed.
+    /// The error of a command that failed, or does not tell a value.
     pub(crate) error: Option<String>,
     /// Wall-clock time \[s\].
     pub(crate) seconds: f64,
@@ -346,6 +346,13 @@ impl Verified {
         };
         let measured = |claimed: &Claimed| claimed.measured(event.as_ref()?);
         let measured: Vec<Option<f64>> = claim.values.iter().map(measured).collect();
+        let lacking = claim.values.iter().zip(&measured);
+        let mut lacking = lacking
+            .filter(|(_, value)| value.is_none())
+            .map(|(claimed, _)| {
+                format!("no number at {} in the event {:?}", claimed.at, claim.event)
+            });
+        let error = error.or_else(|| lacking.next());
         let agreements = claim.values.iter().zip(&measured);
         Verified {
             agreements: agreements
@@ -766,6 +773,7 @@ mod tests {
             shell("near", &done("1.125")),
             shell("far", &done("2")),
             shell("silent", "true"),
+            shell("lacking", &done("{}")),
             shell(
                 "failing",
                 r#"echo '{"event":"error","message":"no room"}'; exit 1"#,
@@ -783,6 +791,7 @@ mod tests {
             NotReproduced,
             NotReproduced,
             NotReproduced,
+            NotReproduced,
         ];
         assert_eq!(agreements, expected);
         let error = |index: usize| outcome.verified[index].error.as_deref().unwrap_or("");
@@ -791,7 +800,8 @@ mod tests {
             "{}",
             error(3)
         );
-        assert!(error(4).ends_with("exit 1: no room"), "{}", error(4));
+        assert_eq!(error(4), "no number at /value in the event \"done\"");
+        assert!(error(5).ends_with("exit 1: no room"), "{}", error(5));
         // What was measured is known; what failed is tried again.
         verify(&options, &session).unwrap();
         let runs = |name: &str| {

@@ -1,7 +1,7 @@
 //! Images, animations and pages made from recordings of rollouts.
 //!
-//! A [`Walk`](walk::Walk) is a validated [`Recording`](crate::task::recording::Recording); a [`Stage`](stage::Stage) decides
-//! which part of the world a picture shows. `scene` and `panel` turn one frame into drawing
+//! A [`Walk`](walk::Walk) is a validated [`Recording`](crate::task::recording::Recording); a
+//! [`Stage`](stage::Stage) decides which part of the world a picture shows. `scene` and `panel` turn one frame into drawing
 //! primitives, and `raster` paints them. The animated GIF, films and the self-contained HTML page
 //! build on these. Figures for print are vectors, in [`plot`]; `serve` has its own page, over HTTP.
 

@@ -170,23 +170,26 @@ mod tests {
     use crate::store::validation::ValidationFile;
     use serde_json::Value;
 
+    /// Reads a text as the kind of file that its format says: files may have any name.
     fn refusal(name: &str, text: &str) -> Option<Error> {
-        fn of<T: Stored>(text: &str, name: &str) -> Option<Error> {
-            parse::<T>(text, name).err()
+        type Refusal = fn(&str, &str) -> Option<Error>;
+        fn of<T: Stored>() -> (&'static str, Refusal) {
+            (T::FORMAT.0, |text, name| parse::<T>(text, name).err())
         }
-        // By its format: a file may have any name.
+        let kinds = [
+            of::<AuditFile>(),
+            of::<CapacityFile>(),
+            of::<EvalFile>(),
+            of::<ResponseFile>(),
+            of::<RunFile>(),
+            of::<TeamFile>(),
+            of::<ValidationFile>(),
+            of::<File>(),
+        ];
         let format = serde_json::from_str::<Value>(text).unwrap()["format"].clone();
-        match format.as_str().unwrap() {
-            format if format == AuditFile::FORMAT.0 => of::<AuditFile>(text, name),
-            format if format == CapacityFile::FORMAT.0 => of::<CapacityFile>(text, name),
-            format if format == EvalFile::FORMAT.0 => of::<EvalFile>(text, name),
-            format if format == ResponseFile::FORMAT.0 => of::<ResponseFile>(text, name),
-            format if format == RunFile::FORMAT.0 => of::<RunFile>(text, name),
-            format if format == TeamFile::FORMAT.0 => of::<TeamFile>(text, name),
-            format if format == ValidationFile::FORMAT.0 => of::<ValidationFile>(text, name),
-            format if format == File::FORMAT.0 => of::<File>(text, name),
-            other => panic!("{name}: no file of the format {other} ships"),
-        }
+        let kind = kinds.iter().find(|(kind, _)| format == *kind);
+        let (_, refusal) = kind.unwrap_or_else(|| panic!("{name}: no file of {format} ships"));
+        refusal(text, name)
     }
 
     /// Returns the path of every JSON file that ships with the program or lies in the repository.

@@ -94,10 +94,15 @@ impl Said {
     /// Parses every line of stdout as JSON.
     #[track_caller]
     pub fn json_lines(&self) -> Vec<serde_json::Value> {
-        let read =
-            |line: &str| serde_json::from_str(line).unwrap_or_else(|e| panic!("{e} in: {line}"));
-        self.out.lines().map(read).collect()
+        json_lines(&self.out)
     }
+}
+
+/// Parses every line of a text as JSON.
+#[track_caller]
+pub fn json_lines(text: &str) -> Vec<serde_json::Value> {
+    let read = |line: &str| serde_json::from_str(line).unwrap_or_else(|e| panic!("{e} in: {line}"));
+    text.lines().map(read).collect()
 }
 
 /// A folder in which commands run; dropping it deletes it.

@@ -290,19 +290,24 @@ fn with_26_classes_nothing_on_the_page_covers_anything_else() {
         // Words of a figure, what stands beside each other, and what stands in a button.
         let covered = "(() => {
            const box = (e) => e.getBoundingClientRect(), found = [];
-           const apart = (a, b) => a.right <= b.left + 1 || b.right <= a.left + 1 || a.bottom <= b.top + 2 || b.bottom <= a.top + 2;
+           const aside = (a, b) => a.right <= b.left + 1 || b.right <= a.left + 1;
+           const apart = (a, b) => aside(a, b) || a.bottom <= b.top + 2 || b.bottom <= a.top + 2;
            const check = (all) => all.forEach((a, i) => all.slice(i + 1).forEach((b) => {
              if (!apart(box(a), box(b))) found.push(a.textContent + ' / ' + b.textContent);
            }));
            const seen = (e) => e.textContent && box(e).width > 0;
-           document.querySelectorAll('.figure svg').forEach((svg) => check([...svg.querySelectorAll('text')].filter(seen)));
-           document.querySelectorAll('.tally li, .stages figcaption, .watch button, .bodies button').forEach((e) => check([...e.children].filter(seen)));
+           const texts = (svg) => [...svg.querySelectorAll('text')];
+           document.querySelectorAll('.figure svg').forEach((svg) => check(texts(svg).filter(seen)));
+           document.querySelectorAll('.tally li, .stages figcaption, .watch button, .bodies button')
+             .forEach((e) => check([...e.children].filter(seen)));
            document.querySelectorAll('.bodies button *, .stages figcaption *').forEach((e) => {
              const own = box(e), room = box(e.closest('button, figcaption'));
-             if (own.right > room.right + 1 || own.left < room.left - 1) found.push('sticks out: ' + e.tagName + ' ' + e.textContent);
+             const is = own.right > room.right + 1 || own.left < room.left - 1;
+             if (is) found.push('sticks out: ' + e.tagName + ' ' + e.textContent);
            });
-           document.querySelectorAll('.figure svg').forEach((svg) => svg.querySelectorAll('text').forEach((e) => {
-             if (box(e).right > box(svg).right + 1 || box(e).left < box(svg).left - 1) found.push('cut off: ' + e.textContent);
+           document.querySelectorAll('.figure svg').forEach((svg) => texts(svg).forEach((e) => {
+             const is = box(e).right > box(svg).right + 1 || box(e).left < box(svg).left - 1;
+             if (is) found.push('cut off: ' + e.textContent);
            }));
            return found;
          })()";

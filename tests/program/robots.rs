@@ -394,7 +394,10 @@ fn runs_of_the_atlas_are_read_compressed_and_leave_their_results_here() {
         .ended(0, &[]);
     assert_eq!(results_of("run/eval").1, results_of("atlas-tiny-1-eval").1);
     sandbox
-        .run("capacity -q --eval atlas-tiny-1-eval.json --set trainings=1 --set clean=true --set mlp.epochs=1 --set sizes=[1,2]")
+        .run(
+            "capacity -q --eval atlas-tiny-1-eval.json --set trainings=1 --set clean=true \
+             --set mlp.epochs=1 --set sizes=[1,2]",
+        )
         .ended(0, &[]);
     for kind in ["accuracy", "capacity"] {
         sandbox

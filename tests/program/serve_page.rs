@@ -167,7 +167,10 @@ fn a_drawn_zero_and_a_drawn_one_are_told_apart_and_the_page_fits_everywhere() {
         assert!(invites.contains("has no task"), "{invites}");
         assert_eq!(tab.text("#knows"), "");
         tab.click("#empty");
-        tab.wait("document.getElementById('checked').dataset.state === 'bad' && document.getElementById('live').disabled");
+        tab.wait(
+            "document.getElementById('checked').dataset.state === 'bad' && \
+             document.getElementById('live').disabled",
+        );
         tab.click("#unpaint");
         tab.wait("!document.getElementById('live').disabled");
         assert_eq!(tab.eval("document.getElementById('error').hidden"), true);
@@ -325,7 +328,8 @@ fn pad_answer_and_what_the_body_knows_are_in_sight_together_on_a_phone_and_on_a_
             let cut = "[...document.querySelectorAll('#stages canvas')].filter((canvas) => {
             const { width, height } = canvas, edge = (...box) => [...canvas.getContext('2d').getImageData(...box).data];
             const all = [edge(0, 0, 1, height), edge(width - 1, 0, 1, height), edge(0, 0, width, 1)].flat();
-            return all.some((_, k) => k % 4 === 0 && Math.max(...all.slice(k, k + 3)) - Math.min(...all.slice(k, k + 3)) > 60);
+            const spread = (three) => Math.max(...three) - Math.min(...three);
+            return all.some((_, k) => k % 4 === 0 && spread(all.slice(k, k + 3)) > 60);
         }).length";
             assert_eq!(tab.eval(cut), 0);
             let tie = "Stages.said({ says: 8, tied: [5, 8], tie_broken_by: 'walks' }, Drawing.classNames())";
@@ -388,7 +392,8 @@ fn a_stroke_goes_on_when_the_pointer_is_taken_away_and_ends_when_it_is_up(tab: &
     // It was lifted where the page does not learn of it: nothing is drawn any more.
     tab.press(line[0]);
     tab.eval(
-        "document.getElementById('pad').dispatchEvent(new PointerEvent('pointermove', { pointerId: 1, pointerType: 'mouse' }))",
+        "document.getElementById('pad').dispatchEvent( \
+         new PointerEvent('pointermove', { pointerId: 1, pointerType: 'mouse' }))",
     );
     tab.trace(&[[line[0][0] + 60.0, line[0][1] + 90.0]]);
     tab.release(line[0]);

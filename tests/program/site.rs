@@ -236,7 +236,8 @@ fn the_module_answers_requests_as_the_program_does() {
     let mut tab = browser.tab(1280, 800, false);
     open(&mut tab, &site.url());
     let script = format!(
-        "import('./engine.js').then(({{ answer }}) => Promise.all({}.map(([method, target, body]) => answer(method, target, body))))",
+        "import('./engine.js').then(({{ answer }}) => \
+         Promise.all({}.map(([method, target, body]) => answer(method, target, body))))",
         json!(REQUESTS)
     );
     let answers = tab.eval(&script);
@@ -279,13 +280,15 @@ fn in_a_hidden_tab_nothing_is_computed() {
     let mut tab = browser.tab(1280, 800, false);
     open(&mut tab, &site.url());
     tab.wait("document.getElementById('engine').textContent");
-    let calls = "window.calls = 0; const post = Worker.prototype.postMessage; Worker.prototype.postMessage = function (...all) { window.calls++; post.apply(this, all); }";
+    let calls = "window.calls = 0; const post = Worker.prototype.postMessage; \
+                 Worker.prototype.postMessage = function (...all) { window.calls++; post.apply(this, all); }";
     tab.eval(&format!("{{ {calls} }}"));
     tab.click("#again");
     tab.wait("window.calls > 5");
     let hide = |tab: &mut Tab, on: bool| {
         tab.eval(&format!(
-            "Object.defineProperty(document, 'hidden', {{ value: {on}, configurable: true }}), document.dispatchEvent(new Event('visibilitychange')), 0"
+            "Object.defineProperty(document, 'hidden', {{ value: {on}, configurable: true }}), \
+             document.dispatchEvent(new Event('visibilitychange')), 0"
         ))
     };
     hide(&mut tab, true);

@@ -1,7 +1,8 @@
 //! What the program prints, word for word: help, results, and the typical errors of every kind.
 //!
 //! Each snapshot in `snapshots/` is a command or a few, how they end, and what they say. Other tests
-//! hold what is done, and which file, key or number is named. After a change that is meant, `UPDATE_SNAPSHOTS=1 cargo test --release --test program snapshots` writes them anew; the
+//! hold what is done, and which file, key or number is named. After a change that is meant,
+//! `UPDATE_SNAPSHOTS=1 cargo test --release --test program snapshots` writes them anew; the
 //! difference is reviewed with the change.
 
 use crate::common::program::{PROGRAM, Sandbox, TINY, gaits, write_images, write_pictures};

@@ -297,7 +297,13 @@ fn the_best_of_many_windows_is_what_a_training_with_that_margin_is() {
         .run(&format!("{other} --resume"))
         .ended(2, &["training.json"]);
     // A robot that keeps its own sensors keeps its window, too.
-    sandbox.run("train -q -a found --task 0|1 --robots all --set train.rounds=0 --set train.windows=20 --set train.challengers=0 --set train.images=4 --set train.final_images=4 --set validation.images=40 --set validation.best=0 -o kept").ended(0, &[]);
+    sandbox
+        .run(
+            "train -q -a found --task 0|1 --robots all --set train.rounds=0 --set train.windows=20 \
+             --set train.challengers=0 --set train.images=4 --set train.final_images=4 \
+             --set validation.images=40 --set validation.best=0 -o kept",
+        )
+        .ended(0, &[]);
     let kept = sandbox.run_file("kept");
     assert_eq!(
         (kept.config.stimulus, kept.elites[0].body.clone()),
@@ -901,7 +907,10 @@ fn images_of_an_earlier_training_never_validate_a_later_one() {
     let train = |from: &str, out: &str, seed: u64| {
         let data = format!("--set data.builtin.seed={seed}");
         sandbox
-            .run(&format!("train -q -a {from} --task 0|1 --robots top:2 {LITTLE} --set train.challengers=0 {data} -o {out}"))
+            .run(&format!(
+                "train -q -a {from} --task 0|1 --robots top:2 {LITTLE} \
+                 --set train.challengers=0 {data} -o {out}"
+            ))
             .ended(0, &[]);
         sandbox.run_file(out)
     };

@@ -1,6 +1,6 @@
 //! `morphcog verify`: its list of claims, and a claim that is measured again.
 
-use crate::common::program::{Sandbox, files, mnist, said};
+use crate::common::program::{Sandbox, files, json_lines, mnist, said};
 use clap::Parser;
 use morphcog::cli::Cli;
 use morphcog::commands::verify::{Claim, claims};
@@ -83,11 +83,7 @@ fn the_team_that_ships_has_the_values_that_are_claimed_of_it() {
     let verified = events.iter().find(|event| event["event"] == "verified");
     let agreements = verified.expect("the claim has a result")["agreements"].clone();
     assert_eq!(agreements, serde_json::json!(["reproduced", "reproduced"]));
-    let events = sandbox.read("verify/team/events.jsonl");
-    let events: Vec<Value> = events
-        .lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect();
+    let events = json_lines(&sandbox.read("verify/team/events.jsonl"));
     for claim in claims().unwrap() {
         if claim.event == "team" {
             assert_measured(&claim, &events);

@@ -16,7 +16,8 @@ use std::path::{Path, PathBuf};
 /// Deepest folder that is looked into: links may lead in a circle.
 const DEEPEST: usize = 8;
 
-const EXPECTED: &str = "a folder with one subfolder of pictures for each class, or files as .npz, .npy, CSV, Parquet or IDX";
+const EXPECTED: &str = "a folder with one subfolder of pictures for each class, or files as .npz, \
+                        .npy, CSV, Parquet or IDX";
 
 /// Kinds of files with many images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

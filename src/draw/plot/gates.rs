@@ -64,7 +64,8 @@ pub(crate) fn gates(all: &[GateWalks], of: &str, style: &Style) -> Figure {
         let lines = names.map(|material| (material, robot::plain(material), material.name()));
         robot::legend(&mut canvas, at, lines, panel);
     }
-    let name = "displacement [voxel lengths], positive to the right; full colour from ±10; dots mark inputs for which the gate is true";
+    let name = "displacement [voxel lengths], positive to the right; full colour from ±10; dots mark \
+                inputs for which the gate is true";
     let axis = Axis::exact(-STRONG, STRONG, 4);
     let shade = |walk: f64| scales::diverging(walk / STRONG);
     let bar = [MARGIN + 6.0, below];
